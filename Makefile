@@ -1,0 +1,145 @@
+# Every command of the project. `make` alone lists them.
+# On a fresh Debian machine only make itself must be there: apt-get install -y make && make demo
+
+SHELL := bash
+.SHELLFLAGS := -euo pipefail -c
+.DELETE_ON_ERROR:
+.DEFAULT_GOAL := help
+
+# An active virtual environment is used; without one, .venv is made.
+VENV := $(or $(VIRTUAL_ENV),$(CURDIR)/.venv)
+PY := $(VENV)/bin/python
+SUDO := $(if $(filter 0,$(shell id -u)),,sudo)
+export CTEST_OUTPUT_ON_FAILURE := 1
+
+# What Debian provides: to build and run, and beyond that to test and lint.
+PACKAGES := g++ cmake ninja-build libeigen3-dev python3-dev python3-venv
+DEV_PACKAGES := $(PACKAGES) clang libclang-rt-dev doctest-dev clang-format valgrind
+
+CXX_FILES = $(shell find cpp tests/cpp -name '*.hpp' -o -name '*.cpp')
+# What the Python module is compiled from.
+CORE_FILES := pyproject.toml CMakeLists.txt $(shell find cpp/include cpp/bindings cpp/cmake -type f)
+
+.PHONY: help
+help: ## list the commands
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "%-17s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+# ---- Install -------------------------------------------------------------------------------------
+
+# $(call apt,PACKAGES): installs those that are missing.
+apt = missing=$$(comm -23 <(tr ' ' '\n' <<< "$(1)" | sort) \
+	    <(dpkg-query -W -f '$${db:Status-Status} $${Package}\n' | sed -n 's/^installed //p' | sort)); \
+	if [ -n "$$missing" ]; then \
+	    $(SUDO) apt-get update -q && \
+	    $(SUDO) env DEBIAN_FRONTEND=noninteractive \
+	        apt-get install -qy --no-install-recommends $$missing; \
+	fi
+
+# The build requirements of pyproject.toml live in the environment: an isolated build would bring
+# pybind11 to a new place each time and compile everything again.
+BUILD_REQUIRES = $(shell sed -nE 's/^requires = \[(.*)\]/\1/p' pyproject.toml | tr -d '",')
+PIP_INSTALL = $(PY) -m pip install --quiet --disable-pip-version-check
+
+.PHONY: setup setup-dev install install-editable
+setup: $(VENV)/.auvest-setup ## install what is missing: Debian packages to build, .venv
+setup-dev: $(VENV)/.auvest-setup-dev ## the same, with all that the tests and linters need
+install: $(VENV)/.auvest-normal ## install the Python package and the command auvest
+install-editable: $(VENV)/.auvest-editable ## install it so that edits of Python files act at once
+
+$(VENV)/.auvest-setup: pyproject.toml
+	$(call apt,$(PACKAGES))
+	test -x $(PY) || python3 -m venv $(VENV)
+	$(PIP_INSTALL) $(foreach r,$(BUILD_REQUIRES),'$(r)')
+	touch $@
+
+$(VENV)/.auvest-setup-dev: $(VENV)/.auvest-setup
+	$(call apt,$(DEV_PACKAGES))
+	touch $@
+
+$(VENV)/.auvest-normal: $(VENV)/.auvest-setup $(CORE_FILES) $(shell find python -name '*.py' -o -name '*.pyi')
+	$(PIP_INSTALL) --no-build-isolation .
+	rm -f $(VENV)/.auvest-editable && touch $@
+
+$(VENV)/.auvest-editable: $(VENV)/.auvest-setup-dev $(CORE_FILES)
+	$(PIP_INSTALL) --no-build-isolation --editable '.[test,dev]'
+	rm -f $(VENV)/.auvest-normal && touch $@
+
+# ---- Use -----------------------------------------------------------------------------------------
+
+.PHONY: demo reproduce wheel
+demo: install ## install and run the first simulation: a table and the path of a figure
+	$(VENV)/bin/auvest simulate aukf
+
+reproduce: install ## every table and figure of the papers, beside ours
+	$(VENV)/bin/auvest reproduce aukf
+
+wheel: setup ## a wheel of the package in dist/
+	$(PY) -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .
+	@ls dist/*.whl
+
+# ---- Test ----------------------------------------------------------------------------------------
+
+.PHONY: test test-cpp test-cpp-matrix test-python
+test: test-python test-cpp test-cpp-matrix ## all tests
+
+test-python: install-editable ## the Python tests
+	$(PY) -m pytest
+
+test-cpp: build-release ## the C++ tests, optimised, with the examples
+	ctest --test-dir build/release
+
+# gcc and clang, each standard, all under the address and undefined-behaviour sanitizers.
+MATRIX := $(foreach compiler,gcc clang,$(foreach std,11 14 17 20,matrix-$(compiler)-$(std)))
+test-cpp-matrix: $(MATRIX) ## the C++ tests: gcc and clang, C++11 to 20, under sanitizers
+
+.PHONY: $(MATRIX) build-release
+$(MATRIX): matrix-%: setup-dev
+	cmake -S . -B build/$@ -G Ninja --log-level=WARNING -D AUVEST_BUILD_TESTS=ON \
+	    -D AUVEST_SANITIZE=ON -D CMAKE_BUILD_TYPE=Debug -D CMAKE_CXX_FLAGS_DEBUG='-O1 -g1' \
+	    -D CMAKE_CXX_COMPILER=$(if $(findstring clang,$@),clang++,g++) \
+	    -D CMAKE_CXX_STANDARD=$(lastword $(subst -, ,$@))
+	cmake --build build/$@
+	ctest --test-dir build/$@
+
+build-release: setup-dev
+	cmake -S . -B build/release -G Ninja --log-level=WARNING -D AUVEST_BUILD_TESTS=ON \
+	    -D AUVEST_BUILD_EXAMPLES=ON -D AUVEST_BUILD_BENCHMARKS=ON -D AUVEST_BUILD_TOOLS=ON
+	cmake --build build/release
+
+# ---- Measure -------------------------------------------------------------------------------------
+
+.PHONY: bench math-accuracy
+bench: build-release install-editable ## instructions and time per step, beside filterpy and Numba
+	build/release/cpp/benchmarks/ukf_step
+	for scalar in float double; do \
+	    valgrind --tool=callgrind --callgrind-out-file=/dev/null \
+	        --toggle-collect=ukf_step_$$scalar build/release/cpp/benchmarks/ukf_step 1000 2>&1 | \
+	        awk -v s=$$scalar '/Collected/ {print "instructions per step, " s ": " $$NF / 1000}'; \
+	done
+	$(PY) -m pytest --benchmark-enable --benchmark-only
+
+math-accuracy: build-release ## errors of the float functions over all 2^32 arguments
+	build/release/cpp/tools/math_accuracy
+
+# ---- Check ---------------------------------------------------------------------------------------
+
+.PHONY: format lint typecheck check clean
+format: install-editable ## rewrite all files in the project's format
+	$(VENV)/bin/ruff format .
+	$(VENV)/bin/ruff check --fix .
+	clang-format -i $(CXX_FILES)
+
+lint: install-editable ## ruff and clang-format, changing nothing
+	$(VENV)/bin/ruff check .
+	$(VENV)/bin/ruff format --check .
+	clang-format --dry-run -Werror $(CXX_FILES)
+
+typecheck: install-editable ## mypy, and the stub of the compiled module against the module
+	$(VENV)/bin/mypy
+	MYPYPATH=python $(VENV)/bin/stubtest auvest._core
+
+check: lint typecheck test ## all of these; what CI runs
+
+clean: ## remove what was built (.venv stays)
+	rm -rf build dist $(VENV)/.auvest-*
+	find . -path ./.venv -prune -o -name __pycache__ -prune -exec rm -rf {} +

@@ -1,0 +1,39 @@
+# How the project's own targets are compiled. Users of auvest::auvest get none of this.
+
+if(CMAKE_SOURCE_DIR STREQUAL PROJECT_SOURCE_DIR)
+  set(CMAKE_CXX_EXTENSIONS OFF)
+  if(NOT CMAKE_CXX_STANDARD)
+    set(CMAKE_CXX_STANDARD 11)
+  endif()
+  if(NOT CMAKE_BUILD_TYPE)
+    set(CMAKE_BUILD_TYPE Release)
+  endif()
+endif()
+
+# auvest_own(target): the library, warnings as errors, sanitizers where AUVEST_SANITIZE is set.
+function(auvest_own target)
+  target_link_libraries(${target} PRIVATE auvest::auvest)
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wconversion -Wshadow -Wdouble-promotion
+                                           -Werror)
+  if(AUVEST_SANITIZE)
+    set(flags -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all
+              -fno-omit-frame-pointer)
+    target_compile_options(${target} PRIVATE ${flags})
+    target_link_options(${target} PRIVATE ${flags})
+  endif()
+endfunction()
+
+# auvest_executables(): each .cpp of the folder is one executable of the same name; they are
+# returned in the caller's variable `executables`.
+function(auvest_executables)
+  find_package(Threads REQUIRED)
+  file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cpp)
+  foreach(source IN LISTS sources)
+    get_filename_component(name ${source} NAME_WE)
+    add_executable(${name} ${source})
+    auvest_own(${name})
+    target_link_libraries(${name} PRIVATE Threads::Threads)
+    list(APPEND executables ${name})
+  endforeach()
+  set(executables ${executables} PARENT_SCOPE)
+endfunction()
