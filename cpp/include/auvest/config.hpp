@@ -1,0 +1,37 @@
+// The one place that looks at the compiler and the platform.
+//
+// auvest promises the same float bits on every target. That holds only where the compiler keeps
+// IEEE 754 semantics, so a build that gives them up is refused here, at compile time.
+#pragma once
+
+#if defined(__FAST_MATH__)
+#error \
+    "auvest: -ffast-math (also part of -Ofast) reorders and approximates float arithmetic. \
+Compile without it; add -ffp-contract=off."
+#endif
+
+#include <cfloat>
+
+#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD > 0
+#error \
+    "auvest: this target evaluates float in a wider type (FLT_EVAL_METHOD > 0), as the x87 unit \
+does. Compile with -msse2 -mfpmath=sse."
+#endif
+
+static_assert(sizeof(float) == 4 && FLT_RADIX == 2 && FLT_MANT_DIG == 24,
+              "auvest needs IEEE 754 binary32 as float");
+
+// A fixed trip count, written out by the compiler. It changes speed, never the order of operations.
+// (clang unrolls such loops by itself.)
+#if defined(__GNUC__) && __GNUC__ >= 8 && !defined(__clang__) && !defined(__AVR__)
+#define AUVEST_UNROLL _Pragma("GCC unroll 16")
+#else
+#define AUVEST_UNROLL
+#endif
+
+// Small kernels that must disappear into their caller.
+#if defined(__GNUC__) && !defined(__AVR__)
+#define AUVEST_INLINE inline __attribute__((always_inline))
+#else
+#define AUVEST_INLINE inline
+#endif

@@ -1,0 +1,72 @@
+// Angles on the circle: wrapping to (-pi, pi].
+//
+// The modulus is the real number 2 pi, not the nearest float, so no error builds up over turns.
+// Definition and measured errors: docs/algorithms/math.md.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+#include "auvest/config.hpp"
+#include "auvest/math/basic.hpp"
+#include "auvest/math/bits.hpp"
+#include "auvest/math/trigonometry.hpp"
+
+namespace auvest {
+namespace math {
+namespace detail {
+
+/// wrap() for a float outside [-pi, pi], and for -pi.
+inline float wrap_outside(float a) {
+  const float size = absolute(a);
+  if (size <= 9.424777f) {  // 3 pi, rounded down
+    // Exact, then one rounding: 2 pi = 6.28318548 - 1.74845553e-07.
+    if (size == pi<float>()) return size;
+    const float wrapped = (size - 6.28318548f) + 1.74845553e-07f;
+    return a < 0.0f ? -wrapped : wrapped;
+  }
+  if (!is_finite(a)) return quiet_nan();
+  const float wrapped = turn_to_radian(fraction_of_turn(size));
+  if (absolute(wrapped) == pi<float>()) return pi<float>();
+  return a < 0.0f ? -wrapped : wrapped;
+}
+
+/// wrap() for a double outside [-pi, pi], by the size of double.
+template <std::size_t Bytes>
+struct DoubleWrap {
+  static double outside(double a) {
+    const double size = absolute(a);
+    if (size <= 9.424777960769379) {  // 3 pi, rounded down
+      if (size == pi<double>()) return size;
+      const double wrapped = (size - 6.28318530717958623) - 2.44929359829470641e-16;
+      return a < 0.0 ? -wrapped : wrapped;
+    }
+    const double wrapped = std::atan2(std::sin(a), std::cos(a));
+    return wrapped == -pi<double>() ? pi<double>() : wrapped;
+  }
+};
+
+template <>
+struct DoubleWrap<4> {
+  static double outside(double a) {
+    return static_cast<double>(wrap_outside(static_cast<float>(a)));
+  }
+};
+
+}  // namespace detail
+
+/// The angle of (-pi, pi] that is congruent to `a` (rad) modulo 2 pi. "pi" as a bound is the
+/// nearest float (double) to pi; an angle inside the bounds comes back bit for bit, others are
+/// reduced modulo the real 2 pi, to within 1 ulp. Not finite: NaN.
+AUVEST_INLINE float wrap(float a) {
+  if (a > -pi<float>() && a <= pi<float>()) return a;
+  return detail::wrap_outside(a);
+}
+AUVEST_INLINE double wrap(double a) {
+  if (a > -pi<double>() && a <= pi<double>()) return a;
+  return detail::DoubleWrap<sizeof(double)>::outside(a);
+}
+
+}  // namespace math
+}  // namespace auvest

@@ -1,0 +1,351 @@
+// Sine, cosine and the four-quadrant arctangent.
+//
+// float: own implementations from + - * / and integer operations in one fixed order, so the bits
+// are the same on every target; at most 2 ulp from the true value for every float.
+// double: sine and cosine are <cmath>'s, the arctangent is a table and a polynomial (at most 2
+// ulp). Where double has 32 bits, the double overloads are the float functions. Derivation and
+// measured errors: docs/algorithms/math.md.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+
+#include "auvest/config.hpp"
+#include "auvest/math/basic.hpp"
+#include "auvest/math/bits.hpp"
+
+namespace auvest {
+namespace math {
+namespace detail {
+
+/// x / (2 pi) modulo 1, in units of 2^-64 turn, for a finite x >= 0.5. Error below 3 units.
+///
+/// x = m 2^e with a 24-bit integer m. Digits of 1/(2 pi) that meet m above the binary point make
+/// whole turns and are skipped; 96 digits from there on leave 2^-64 of a turn after the product.
+inline uint64_t fraction_of_turn(float x) {
+  // 1/(2 pi), most significant byte first, after 24 zero bits (the shift of the smallest x).
+  static const uint8_t kDigits[] = {0x00, 0x00, 0x00, 0x28, 0xbe, 0x60, 0xdb, 0x93, 0x91, 0x05,
+                                    0x4a, 0x7f, 0x09, 0xd5, 0xf4, 0x7d, 0x4d, 0x37, 0x70, 0x36,
+                                    0xd8, 0xa5, 0x66, 0x4f, 0x10, 0xe4, 0x10, 0x7f};
+  const uint32_t bits = to_bits(x);
+  const uint32_t first = (bits >> 23) - 126u;  // first digit needed, 0..128
+  const uint32_t m = ((bits & 0x007fffffu) | 0x00800000u) << (first & 7u);
+  const uint8_t* digits = kDigits + (first >> 3);
+  uint32_t word[3];
+  for (uint32_t i = 0; i < 3; ++i) {
+    word[i] = (static_cast<uint32_t>(digits[4 * i]) << 24) |
+              (static_cast<uint32_t>(digits[4 * i + 1]) << 16) |
+              (static_cast<uint32_t>(digits[4 * i + 2]) << 8) |
+              static_cast<uint32_t>(digits[4 * i + 3]);
+  }
+  const uint64_t wide = m;
+  return (static_cast<uint64_t>(m * word[0]) << 32) + wide * word[1] + ((wide * word[2]) >> 32);
+}
+
+/// The angle, in rad, of a signed fraction of a turn in units of 2^-64 turn; rounded once, with an
+/// error below 0.54 ulp of the given fraction.
+inline float turn_to_radian(uint64_t turn) {
+  if (turn == 0) return 0.0f;
+  const uint32_t sign = static_cast<uint32_t>(turn >> 32) & 0x80000000u;
+  const uint64_t size = sign != 0 ? ~turn + 1u : turn;
+  uint32_t high = static_cast<uint32_t>(size >> 32);
+  uint32_t low = static_cast<uint32_t>(size);
+  uint32_t exponent = 129;  // of 2^-1 turn = pi rad, before the product's own carry
+  if (high == 0) {
+    high = low;
+    low = 0;
+    exponent -= 32;
+  }
+  while ((high & 0x80000000u) == 0) {
+    high = (high << 1) | (low >> 31);
+    low <<= 1;
+    --exponent;
+  }
+  // 2 pi = 0xc90fdaa2 * 2^-29; the product has its leading one in bit 31 or 30.
+  uint32_t product = static_cast<uint32_t>((static_cast<uint64_t>(high) * 0xc90fdaa2u) >> 32);
+  if ((product & 0x80000000u) == 0) {
+    product <<= 1;
+    --exponent;
+  }
+  // The rounding carry, if any, moves into the exponent, as it must.
+  return from_bits(sign | (((exponent - 1u) << 23) + (product >> 8) + ((product >> 7) & 1u)));
+}
+
+/// The x in [-pi/4, pi/4] (plus a few ulp) and the number of quarter turns, modulo 4, that make up
+/// a finite angle.
+struct ReducedAngle {
+  float angle_rad;
+  uint32_t quarter;
+};
+
+inline ReducedAngle reduce_quarter(float x) {
+  ReducedAngle reduced;
+  const float size = absolute(x);
+  if (size <= 96.0f) {
+    // pi/2 in three parts: k times the first (18 bits) or the second (18 bits) is exact.
+    const float kShift = 12582912.0f;  // 1.5 * 2^23: adding it rounds to an integer
+    const float shifted = x * 0.636619772f + kShift;
+    const float k = shifted - kShift;
+    const float first = x - k * 1.57079315f;   // exact
+    const float second = k * 3.17493686e-06f;  // exact
+    const float high = first - second;
+    const float lost = (first - high) - second;
+    reduced.angle_rad = high + (lost - k * 2.56334407e-12f);
+    reduced.quarter = to_bits(shifted) & 3u;
+    return reduced;
+  }
+  const uint64_t turn = fraction_of_turn(size);
+  const uint64_t quarter = (turn + (static_cast<uint64_t>(1) << 61)) >> 62;
+  const float angle = turn_to_radian(turn - (quarter << 62));
+  const uint32_t count = static_cast<uint32_t>(quarter);
+  const bool negative = (to_bits(x) & 0x80000000u) != 0;
+  reduced.angle_rad = negative ? -angle : angle;
+  reduced.quarter = (negative ? 0u - count : count) & 3u;
+  return reduced;
+}
+
+/// sin(x) for |x| <= pi/4. The sign of a zero is lost.
+AUVEST_INLINE float sin_kernel(float x) {
+  const float u = x * x;
+  const float p = -1.66666552e-01f + u * (8.33218917e-03f + u * -1.95182845e-04f);
+  return x + x * (u * p);
+}
+
+/// cos(x) for |x| <= pi/4.
+AUVEST_INLINE float cos_kernel(float x) {
+  const float u = x * x;
+  const float p = 4.16666456e-02f + u * (-1.38873095e-03f + u * 2.44323273e-05f);
+  return (1.0f - 0.5f * u) + (u * u) * p;
+}
+
+/// atan2() where |y / x| or |x / y|, whichever is smaller, is below 2^-100 or not a number.
+inline float atan2_rare(float y, float x) {
+  if (is_nan(x) || is_nan(y)) return quiet_nan();
+  const float size_x = absolute(x);
+  const float size_y = absolute(y);
+  const bool left = (to_bits(x) & 0x80000000u) != 0;
+  if (size_x == size_y) {  // two zeros or two infinities
+    if (size_x == 0.0f) return copy_sign(left ? pi<float>() : 0.0f, y);
+    return copy_sign(left ? 2.35619449f : 0.785398163f, y);
+  }
+  if (size_y > size_x) return copy_sign(half_pi<float>(), y);
+  if (left) return copy_sign(pi<float>(), y);
+  // The quotient may be subnormal, where not every target's division rounds correctly.
+  const float scaled = size_y * 1.84467441e+19f / size_x;       // times 2^64
+  if (!(scaled >= 1.29246971e-26f)) return copy_sign(0.0f, y);  // 2^-86; NaN if x is infinite
+  return copy_sign(scale_by_power(scaled, -64), y);
+}
+
+/// The double functions, by the size of double.
+template <std::size_t Bytes>
+struct DoubleTrigonometry {
+  static_assert(Bytes == 8, "a double of 32 or 64 bits is expected");
+
+  static double sin(double x) { return std::sin(x); }
+  static double cos(double x) { return std::cos(x); }
+  static void sincos(double x, double& s, double& c) {
+    s = std::sin(x);
+    c = std::cos(x);
+  }
+
+  static AUVEST_INLINE double atan2(double y, double x) {
+    struct Parts {
+      double high, low;
+    };
+    // atan(i / 32).
+    static const Parts kAngle[33] = {{0.0, 0.0},
+                                     {0.031239833430268277, -1.188442711587748e-18},
+                                     {0.06241880999595735, -1.5490756308295046e-18},
+                                     {0.09347678115858947, -6.2844725995420954e-18},
+                                     {0.12435499454676144, -3.1253241424539383e-18},
+                                     {0.15499674192394097, 9.585415594114324e-18},
+                                     {0.18534794999569476, 4.180692268843079e-18},
+                                     {0.21535769969773805, 4.738160130078733e-19},
+                                     {0.24497866312686414, 1.0698755618734451e-17},
+                                     {0.2741674511196588, 8.261353575163773e-18},
+                                     {0.3028848683749714, -1.1010827903001369e-17},
+                                     {0.3310960767041321, -7.952610375793799e-18},
+                                     {0.35877067027057225, -2.4623815582638635e-17},
+                                     {0.38588266939807375, 2.378822732491941e-17},
+                                     {0.4124104415973873, -1.587652227770689e-17},
+                                     {0.43833655985795783, -2.494277030626541e-17},
+                                     {0.4636476090008061, 2.2698777452961687e-17},
+                                     {0.48833395105640554, -1.1373236189329585e-17},
+                                     {0.5123894603107377, -2.5462781472855804e-17},
+                                     {0.5358112379604637, -4.0637956834825575e-18},
+                                     {0.5585993153435624, -5.4556305485916264e-18},
+                                     {0.5807563535676704, -1.441464378193067e-17},
+                                     {0.6022873461349642, 2.950430737228402e-17},
+                                     {0.6231993299340659, 2.672403885140095e-17},
+                                     {0.6435011087932844, 1.5834785051444286e-17},
+                                     {0.6632029927060933, -3.076054864429649e-17},
+                                     {0.6823165548747481, 6.943223671560008e-18},
+                                     {0.7008544078844502, -1.987626234335816e-17},
+                                     {0.7188299996216245, -2.1478388444456983e-17},
+                                     {0.7362574289814281, 3.473937648299457e-17},
+                                     {0.7531512809621944, -2.4256934659182068e-17},
+                                     {0.7695264804056583, -3.704991905602721e-17},
+                                     {0.7853981633974483, 3.061616997868383e-17}};
+    // By octant: 0, pi/2 or pi plus or minus atan(small / large).
+    struct Octant {
+      double high, low, sign, unused;
+    };
+    static const Octant kOctant[4] = {
+        {0.0, 0.0, 1.0, 0.0},
+        {1.57079632679489661923, 6.12323399573676604e-17, -1.0, 0.0},
+        {3.14159265358979323846, 1.22464679914735321e-16, -1.0, 0.0},
+        {1.57079632679489661923, 6.12323399573676604e-17, 1.0, 0.0},
+    };
+    const double size_x = absolute(x);
+    const double size_y = absolute(y);
+    const double small = size_x < size_y ? size_x : size_y;
+    const double large = size_y > size_x ? size_y : size_x;
+    const double ratio = small / large;
+    if (!(ratio <= 1.0)) return std::atan2(y, x);  // 0/0, inf/inf and NaN
+    // atan(ratio) = atan(c) + atan(z), c a multiple of 1/32, -1/128 <= z <= 3/128: below c = 1/32,
+    // where atan(c) and a negative z would cancel, the interval of c = 0 reaches up to 3/128.
+    const double kShift = 211106232532992.0;  // 1.5 * 2^47: adding it rounds to a multiple of 1/32
+    const double shifted = (ratio - 0.0078125) + kShift;
+    const double c = shifted - kShift;
+    const double z = (ratio - c) / (1.0 + c * ratio);
+    uint64_t bits;
+    std::memcpy(&bits, &shifted, sizeof bits);
+    const double u = z * z;
+    const double p =
+        -0.33333333333333276 +
+        u * (0.19999999998980503 + u * (-0.14285708671535216 + u * 0.11098942039048114));
+    const Parts& angle = kAngle[bits & 63u];
+    const Octant& o = kOctant[(size_y > size_x ? 1u : 0u) + (x < 0.0 ? 2u : 0u)];
+    const double tail = z + (angle.low + z * (u * p));
+    return copy_sign((o.high + o.sign * angle.high) + (o.low + o.sign * tail), y);
+  }
+};
+
+template <>
+struct DoubleTrigonometry<4> {
+  static double sin(double x);
+  static double cos(double x);
+  static void sincos(double x, double& s, double& c);
+  static double atan2(double y, double x);
+};
+
+}  // namespace detail
+
+/// sin(x), x in rad. Not finite: NaN.
+inline float sin(float x) {
+  const uint32_t size = to_bits(x) & 0x7fffffffu;
+  if (size < 0x39800000u) return x;  // |x| < 2^-12
+  if (size <= 0x3f490fdbu) return detail::sin_kernel(x);
+  if (size >= 0x7f800000u) return quiet_nan();
+  const detail::ReducedAngle r = detail::reduce_quarter(x);
+  const float s =
+      (r.quarter & 1u) != 0 ? detail::cos_kernel(r.angle_rad) : detail::sin_kernel(r.angle_rad);
+  return (r.quarter & 2u) != 0 ? -s : s;
+}
+
+/// cos(x), x in rad. Not finite: NaN.
+inline float cos(float x) {
+  const uint32_t size = to_bits(x) & 0x7fffffffu;
+  if (size <= 0x3f490fdbu) return detail::cos_kernel(x);
+  if (size >= 0x7f800000u) return quiet_nan();
+  const detail::ReducedAngle r = detail::reduce_quarter(x);
+  const float c =
+      (r.quarter & 1u) != 0 ? detail::sin_kernel(r.angle_rad) : detail::cos_kernel(r.angle_rad);
+  return ((r.quarter + 1u) & 2u) != 0 ? -c : c;
+}
+
+/// s = sin(x), c = cos(x), the same bits as the two functions.
+inline void sincos(float x, float& s, float& c) {
+  const uint32_t size = to_bits(x) & 0x7fffffffu;
+  if (size <= 0x3f490fdbu) {
+    s = size < 0x39800000u ? x : detail::sin_kernel(x);
+    c = detail::cos_kernel(x);
+    return;
+  }
+  if (size >= 0x7f800000u) {
+    s = quiet_nan();
+    c = quiet_nan();
+    return;
+  }
+  const detail::ReducedAngle r = detail::reduce_quarter(x);
+  const float sine = detail::sin_kernel(r.angle_rad);
+  const float cosine = detail::cos_kernel(r.angle_rad);
+  const bool odd = (r.quarter & 1u) != 0;
+  const float a = odd ? cosine : sine;
+  const float b = odd ? sine : cosine;
+  s = (r.quarter & 2u) != 0 ? -a : a;
+  c = ((r.quarter + 1u) & 2u) != 0 ? -b : b;
+}
+
+/// The angle of the point (x, y) in rad, in [-pi, pi], with C99's results for signed zeros and
+/// infinities. A NaN gives NaN.
+AUVEST_INLINE float atan2(float y, float x) {
+  // By octant: pi/2 or pi, in two parts, plus or minus atan(z).
+  struct Octant {
+    float high, low;
+    uint32_t sign;
+  };
+  static const Octant kOctant[4] = {
+      {0.0f, 0.0f, 0u},
+      {1.57079637f, -4.37113883e-08f, 0x80000000u},
+      {3.14159274f, -8.74227766e-08f, 0x80000000u},
+      {1.57079637f, -4.37113883e-08f, 0u},
+  };
+  const float size_x = absolute(x);
+  const float size_y = absolute(y);
+  const float small = size_x < size_y ? size_x : size_y;
+  const float large = size_y > size_x ? size_y : size_x;
+  const float ratio = small / large;
+  const uint32_t ratio_bits = to_bits(ratio);
+  // Outside [2^-100, 1], or NaN.
+  if (ratio_bits - 0x0d800000u > 0x3f800000u - 0x0d800000u) return detail::atan2_rare(y, x);
+  const Octant& o = kOctant[(size_y > size_x ? 1u : 0u) + (x < 0.0f ? 2u : 0u)];
+  const float z = from_bits(ratio_bits ^ o.sign);
+  // Below 2^-12 z^3 / 3 is less than a sixth of an ulp of z; powers of z would become subnormal.
+  float tail = o.low;
+  if (ratio_bits >= 0x39800000u) {
+    // atan(z) = z + z^3 P(z^2). The terms alternate in sign: added in pairs they stay small.
+    const float u = ratio * ratio;
+    const float v = u * u;
+    const float p0 = -3.33331525e-01f + u * 1.99937671e-01f;
+    const float p1 = -1.42110020e-01f + u * 1.06657691e-01f;
+    const float p2 = -7.55166039e-02f + u * 4.32047322e-02f;
+    const float p3 = -1.63631924e-02f + u * 2.91942270e-03f;
+    const float p = p0 + v * (p1 + v * (p2 + v * p3));
+    tail = o.low + z * (u * p);
+  }
+  return copy_sign((o.high + z) + tail, y);
+}
+
+inline double sin(double x) { return detail::DoubleTrigonometry<sizeof(double)>::sin(x); }
+inline double cos(double x) { return detail::DoubleTrigonometry<sizeof(double)>::cos(x); }
+inline void sincos(double x, double& s, double& c) {
+  detail::DoubleTrigonometry<sizeof(double)>::sincos(x, s, c);
+}
+AUVEST_INLINE double atan2(double y, double x) {
+  return detail::DoubleTrigonometry<sizeof(double)>::atan2(y, x);
+}
+
+namespace detail {
+
+inline double DoubleTrigonometry<4>::sin(double x) {
+  return static_cast<double>(math::sin(static_cast<float>(x)));
+}
+inline double DoubleTrigonometry<4>::cos(double x) {
+  return static_cast<double>(math::cos(static_cast<float>(x)));
+}
+inline void DoubleTrigonometry<4>::sincos(double x, double& s, double& c) {
+  float sine, cosine;
+  math::sincos(static_cast<float>(x), sine, cosine);
+  s = static_cast<double>(sine);
+  c = static_cast<double>(cosine);
+}
+inline double DoubleTrigonometry<4>::atan2(double y, double x) {
+  return static_cast<double>(math::atan2(static_cast<float>(y), static_cast<float>(x)));
+}
+
+}  // namespace detail
+}  // namespace math
+}  // namespace auvest

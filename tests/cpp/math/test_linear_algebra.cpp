@@ -1,0 +1,101 @@
+#include "auvest/math/linear_algebra.hpp"
+
+#include <doctest/doctest.h>
+
+#include <Eigen/Cholesky>
+
+#include "auvest/math/random.hpp"
+
+namespace {
+
+using auvest::Matrix;
+using auvest::Vector;
+
+template <class Scalar, int N>
+Matrix<Scalar, N, N> random_covariance(auvest::math::Random& random) {
+  Matrix<Scalar, N, N> a;
+  for (int i = 0; i < N; ++i) {
+    for (int j = 0; j < N; ++j) a(i, j) = random.normal<Scalar>();
+  }
+  Matrix<Scalar, N, N> p = a * a.transpose();
+  for (int i = 0; i < N; ++i) p(i, i) += Scalar(0.1);
+  return p;
+}
+
+template <int Cols, class Scalar, int N>
+double reconstruction_error(const Matrix<Scalar, N, N>& p) {
+  Matrix<Scalar, N, N> a = p;
+  REQUIRE(auvest::math::partial_cholesky<Cols>(a));
+  double worst = 0;
+  for (int i = 0; i < N; ++i) {
+    for (int j = 0; j <= i; ++j) {
+      double sum = j >= Cols ? double(a(i, j)) : 0.0;
+      for (int k = 0; k < Cols && k <= j; ++k) sum += double(a(i, k)) * double(a(j, k));
+      worst = std::max(worst, std::fabs(sum - double(p(i, j))) / double(p.trace()));
+    }
+  }
+  return worst;
+}
+
+TEST_CASE("partial Cholesky: factor and Schur complement give the matrix back") {
+  auvest::math::Random random(1);
+  for (int trial = 0; trial < 50; ++trial) {
+    const auto p = random_covariance<double, 6>(random);
+    CHECK(reconstruction_error<1>(p) < 4e-16);
+    CHECK(reconstruction_error<2>(p) < 4e-16);
+    CHECK(reconstruction_error<6>(p) < 8e-16);
+    const auto q = random_covariance<float, 6>(random);
+    CHECK(reconstruction_error<2>(q) < 4e-7);
+  }
+}
+
+TEST_CASE("partial Cholesky: the full factor is Eigen's") {
+  auvest::math::Random random(2);
+  const auto p = random_covariance<double, 6>(random);
+  Matrix<double, 6, 6> a = p;
+  REQUIRE(auvest::math::partial_cholesky<6>(a));
+  const Eigen::Matrix<double, 6, 6> expected = Eigen::Matrix<double, 6, 6>(p).llt().matrixL();
+  for (int i = 0; i < 6; ++i) {
+    for (int j = 0; j <= i; ++j) CHECK(a(i, j) == doctest::Approx(expected(i, j)).epsilon(1e-13));
+  }
+}
+
+TEST_CASE("partial Cholesky: a lost pivot is floored, a bad diagonal refused") {
+  Matrix<float, 2, 2> p;
+  p << 1, 1, 1, 1;  // singular: the second pivot is 0
+  REQUIRE(auvest::math::partial_cholesky<2>(p));
+  CHECK(p(1, 1) == doctest::Approx(std::sqrt(4 * std::numeric_limits<float>::epsilon())));
+  for (const float bad : {0.0f, -1.0f, std::nanf("")}) {
+    Matrix<float, 2, 2> q;
+    q << 1, 0, 0, bad;
+    CHECK_FALSE(auvest::math::partial_cholesky<2>(q));
+  }
+}
+
+TEST_CASE("positive definite: against the smallest eigenvalue's sign") {
+  Matrix<double, 3, 3> p;
+  p << 2, -1, 0, -1, 2, -1, 0, -1, 2;
+  CHECK(auvest::math::is_positive_definite(p));
+  p(2, 2) = 0.5;  // determinant 2 (2 * 0.5 - 1) - 0.5 < 0
+  CHECK_FALSE(auvest::math::is_positive_definite(p));
+  p(0, 0) = std::numeric_limits<double>::infinity();
+  CHECK_FALSE(auvest::math::is_positive_definite(p));
+}
+
+TEST_CASE("symmetric product: against Eigen") {
+  auvest::math::Random random(3);
+  const auto p = random_covariance<double, 4>(random);
+  Matrix<double, 4, 4> phi;
+  for (int i = 0; i < 4; ++i) {
+    for (int j = 0; j < 4; ++j) phi(i, j) = random.normal<double>();
+  }
+  Matrix<double, 4, 4> lower = p;
+  for (int i = 0; i < 4; ++i) {
+    for (int j = i + 1; j < 4; ++j) lower(i, j) = 1e9;  // the upper triangle must not be read
+  }
+  const auto result = auvest::math::symmetric_product(phi, lower);
+  const Matrix<double, 4, 4> expected = phi * p * phi.transpose();
+  CHECK((result - expected).cwiseAbs().maxCoeff() < 1e-12 * expected.trace());
+}
+
+}  // namespace
