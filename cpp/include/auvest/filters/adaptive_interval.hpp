@@ -1,0 +1,72 @@
+// A filter that chooses its own sampling interval: any Gaussian filter plus an interval policy.
+//
+//     filter.predict(filter.interval());    // the sensor is read interval() seconds later
+//     filter.update(z, sonar);              // left out when the measurement is missing
+//     filter.feedback(reference);           // T(k): when to read the sensor next
+#pragma once
+
+#include "auvest/filters/gaussian_filter.hpp"
+
+namespace auvest {
+
+template <class Filter, class Policy_>
+class AdaptiveInterval : public Filter {
+ public:
+  using Policy = Policy_;
+  using typename Filter::BeliefType;
+  using typename Filter::Covariance;
+  using typename Filter::Scalar;
+  using typename Filter::State;
+  using Position = Vector<Scalar, 2>;
+
+  explicit AdaptiveInterval(const Filter& filter, const Policy& policy = Policy())
+      : Filter(filter), policy_(policy), interval_(policy.initial()) {}
+
+  /// Sets the belief and starts the policy; `reference` is the desired position (m) at step 0.
+  Status reset(const State& x0, const Covariance& P0, const Position& reference) {
+    if (!math::all_finite(reference)) return Status::kNotFinite;
+    const Status status = Filter::reset(x0, P0);
+    if (status != Status::kOk) return status;
+    Position estimate;
+    estimate(0) = x0(0);
+    estimate(1) = x0(1);
+    policy_.restart(estimate, reference);
+    interval_ = policy_.initial();
+    return Status::kOk;
+  }
+
+  /// As above, with the desired track starting where the filter does: X(0) = R(0).
+  Status reset(const State& x0, const Covariance& P0) {
+    Position reference;
+    reference(0) = x0(0);
+    reference(1) = x0(1);
+    return reset(x0, P0, reference);
+  }
+
+  /// Takes back what belief(), policy() and interval() gave: the same bits go on.
+  Status restore(const BeliefType& belief, const Policy& policy, Scalar interval) {
+    if (!math::is_finite(interval)) return Status::kNotFinite;
+    const Status status = Filter::restore(belief);
+    if (status != Status::kOk) return status;
+    policy_ = policy;
+    interval_ = interval;
+    return Status::kOk;
+  }
+
+  /// Chooses the interval to the next sample; `reference` is the desired position (m) now.
+  Status feedback(const Position& reference) {
+    if (!this->initialised()) return Status::kNotInitialised;
+    if (!math::all_finite(reference)) return Status::kNotFinite;
+    interval_ = policy_.next(*this, reference);
+    return Status::kOk;
+  }
+
+  Scalar interval() const { return interval_; }  ///< T(k) [s]
+  const Policy& policy() const { return policy_; }
+
+ private:
+  Policy policy_;
+  Scalar interval_;
+};
+
+}  // namespace auvest

@@ -1,0 +1,53 @@
+// The scaled sigma points and the constants of their transform in deviation form.
+//
+// c = n + lambda = alpha^2 (n + kappa). The textbook weights are 1/(2c) and lambda/c: for the
+// paper's alpha = 1e-6 that is 1.7e11 and -2e12, which cancel to nothing in 32 bits. Written with
+// deviations from the centre point the 1/c parts cancel on paper instead (docs/algorithms/ukf.md):
+//
+//     m    = sum_i (d_i+ + d_i-) / (2c)
+//     mean = h(x) + m
+//     P_yy = sum_i (s_i s_i' + t_i t_i') + (beta - alpha^2) m m'
+//            with s_i = (d_i+ + d_i-) / (2 sqrt c),  t_i = (d_i+ - d_i-) / (2 sqrt c)
+//     P_xy = sum_i L_i t_i'
+#pragma once
+
+#include "auvest/math/basic.hpp"
+#include "auvest/status.hpp"
+
+namespace auvest {
+
+template <class Scalar>
+struct SigmaPoints {
+  struct Params {
+    Scalar alpha = Scalar(1);   ///< spread of the points, 1e-8..1; Table 1: 1e-6
+    Scalar beta = Scalar(2);    ///< prior knowledge, >= alpha^2; 2 is best for a Gaussian; Table 1
+    Scalar kappa = Scalar(-3);  ///< secondary scaling, n + kappa > 0; Table 1
+  };
+
+  Scalar sqrt_c;       ///< sigma points lie at x +- sqrt_c L_i
+  Scalar half_sqrt_c;  ///< 1 / (2 sqrt c): turns sums and differences into s_i and t_i
+  Scalar mean_weight;  ///< 1 / sqrt c: m = mean_weight sum_i s_i
+  Scalar centre;       ///< beta - alpha^2, the weight of m m'
+  Status status;       ///< kBadParameter if the parameters are out of range
+  bool fine;           ///< c is so small that subtracted deviations would have lost their digits
+
+  SigmaPoints(const Params& params, int n) {
+    using math::is_finite;
+    using math::sqrt;
+    const Scalar scale = Scalar(n) + params.kappa;
+    const Scalar c = params.alpha * params.alpha * scale;
+    const bool valid = params.alpha >= Scalar(1e-8) && !(params.alpha > Scalar(1)) &&
+                       is_finite(params.beta) && params.beta >= params.alpha * params.alpha &&
+                       is_finite(params.kappa) && scale > Scalar(0);
+    status = valid ? Status::kOk : Status::kBadParameter;
+    sqrt_c = valid ? sqrt(c) : Scalar(1);
+    half_sqrt_c = Scalar(0.5) / sqrt_c;
+    mean_weight = Scalar(1) / sqrt_c;
+    centre = params.beta - params.alpha * params.alpha;
+    // Subtraction leaves h(x+e) - h(x) with an error of one ulp of h, and the transform divides
+    // its second differences by c: below c = sqrt(epsilon) fewer than half the digits are left.
+    fine = c * c < math::machine_epsilon<Scalar>();
+  }
+};
+
+}  // namespace auvest

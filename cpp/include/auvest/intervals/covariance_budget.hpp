@@ -1,0 +1,66 @@
+// The interval policy that keeps accuracy instead of a ratio: the largest T in [T_min, T_max] after
+// which the predicted position standard deviation, sqrt(P_xx + P_yy), is still within a budget.
+//
+// Not in the paper. It needs no reference track, and it spends samples where uncertainty grows.
+#pragma once
+
+#include "auvest/math/basic.hpp"
+#include "auvest/status.hpp"
+#include "auvest/types.hpp"
+
+namespace auvest {
+
+template <class Scalar_>
+struct CovarianceBudget {
+  using Scalar = Scalar_;
+  using Position = Vector<Scalar, 2>;
+
+  struct Params {
+    Scalar initial_s = Scalar(0.5);         ///< T(0)
+    Scalar min_s = Scalar(0.02);            ///< T_min
+    Scalar max_s = Scalar(1);               ///< T_max, Table 1
+    Scalar position_sigma_m = Scalar(0.1);  ///< budget for sqrt(P_xx + P_yy) before an update
+  };
+
+  Params params;
+
+  explicit CovarianceBudget(const Params& p = Params()) : params(p) {}
+
+  Scalar initial() const { return params.initial_s; }
+  void restart(const Position&, const Position&) {}
+
+  /// Bisection on the predicted variance, ten halvings: T is right to 0.1 % of T_max - T_min and
+  /// never above the budget, unless T_min itself is.
+  template <class Filter>
+  Scalar next(const Filter& filter, const Position&) {
+    const Scalar budget = params.position_sigma_m * params.position_sigma_m;
+    if (!(variance(filter, params.max_s) > budget)) return params.max_s;
+    Scalar low = params.min_s;
+    Scalar high = params.max_s;
+    for (int i = 0; i < 10; ++i) {
+      const Scalar middle = Scalar(0.5) * (low + high);
+      if (variance(filter, middle) > budget) {
+        high = middle;
+      } else {
+        low = middle;
+      }
+    }
+    return low;
+  }
+
+  Status check() const {
+    const bool valid = math::is_finite(params.initial_s) && math::is_finite(params.min_s) &&
+                       math::is_finite(params.max_s) && math::is_finite(params.position_sigma_m) &&
+                       params.min_s > Scalar(0) && params.initial_s >= params.min_s &&
+                       params.max_s >= params.initial_s && params.position_sigma_m > Scalar(0);
+    return valid ? Status::kOk : Status::kBadParameter;
+  }
+
+ private:
+  template <class Filter>
+  static Scalar variance(const Filter& filter, Scalar dt) {
+    return filter.process().position_variance(filter.belief().P, dt);
+  }
+};
+
+}  // namespace auvest

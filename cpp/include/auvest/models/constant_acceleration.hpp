@@ -1,0 +1,173 @@
+// Planar constant acceleration: state [x, y, vx, vy, ax, ay] (m, m/s, m/s^2), Eq. (5) of the AUKF
+// paper (Deng, Yin, Duan 2019).
+//
+// With N the shift that maps velocity to position and acceleration to velocity, the transition
+// matrix is Phi(dt) = exp(N dt) = I + N dt + N^2 dt^2 / 2. The paper stops after the first power:
+//
+//   EulerAcceleration   Phi = I + N dt                 exactly Eq. (4), no dt^2/2 term
+//   ExactAcceleration   Phi = I + N dt + N^2 dt^2 / 2  the exact discretisation
+//
+// Differs from Eq. (4): the paper gives no covariance for its process noise w. Here white noise
+// drives each derivative with a power spectral density per state, so that Q fits any interval:
+// Q = dt diag(q) to first order (Euler), and the integral of Phi(s) diag(q) Phi(s)' ds (exact).
+#pragma once
+
+#include "auvest/models/process_model.hpp"
+
+namespace auvest {
+
+/// Power spectral densities of the white noise on the rates of the six states, equal for x and y.
+template <class Scalar>
+struct AccelerationNoise {
+  Scalar position = Scalar(1e-6);      ///< q_p [m^2/s]
+  Scalar velocity = Scalar(1e-4);      ///< q_v [m^2/s^3]
+  Scalar acceleration = Scalar(1e-5);  ///< q_a [m^2/s^5]: white jerk
+};
+
+template <class Scalar_, int Order>
+struct ConstantAcceleration : ProcessModel<ConstantAcceleration<Scalar_, Order>, Scalar_, 6> {
+  static_assert(Order == 1 || Order == 2, "the Taylor series of Phi ends with its second power");
+  using Base = ProcessModel<ConstantAcceleration<Scalar_, Order>, Scalar_, 6>;
+  using Scalar = Scalar_;
+  using typename Base::Covariance;
+  using typename Base::State;
+  using Params = AccelerationNoise<Scalar>;
+  static constexpr bool kLinear = true;
+
+  Params params;
+
+  explicit ConstantAcceleration(const Params& noise = Params()) : params(noise) {}
+
+  /// Eq. (4): x(k+1) = Phi(dt) x(k).
+  State f(const State& x, Scalar dt) const {
+    const Coefficients c(dt);
+    State next;
+    AUVEST_UNROLL
+    for (int i = 0; i < 6; ++i) {
+      Scalar value = x(i);
+      if (i + 2 < 6) value = value + c.first * x(i + 2);
+      if (Order == 2 && i + 4 < 6) value = value + c.second * x(i + 4);
+      next(i) = value;
+    }
+    return next;
+  }
+
+  Covariance Phi(const State&, Scalar dt) const {
+    const Coefficients c(dt);
+    Covariance phi;
+    for (int i = 0; i < 6; ++i) {
+      for (int j = 0; j < 6; ++j) {
+        phi(i, j) = Scalar(0);
+        if (j == i) phi(i, j) = Scalar(1);
+        if (j == i + 2) phi(i, j) = c.first;
+        if (Order == 2 && j == i + 4) phi(i, j) = c.second;
+      }
+    }
+    return phi;
+  }
+
+  Covariance Q(Scalar dt) const {
+    Covariance q;
+    for (int i = 0; i < 6; ++i) {
+      for (int j = 0; j < 6; ++j) q(i, j) = Scalar(0);
+    }
+    add_noise(q, dt);
+    math::mirror_lower(q);
+    return q;
+  }
+
+  /// x <- Phi x, P <- Phi P Phi' + Q in place. Row by row, every element is formed from elements
+  /// further down or to the right, which still hold their old values.
+  void propagate(Belief<Scalar, 6>& belief, Scalar dt) const {
+    const Coefficients c(dt);
+    Covariance& p = belief.P;
+    AUVEST_UNROLL
+    for (int i = 0; i < 6; ++i) {
+      AUVEST_UNROLL
+      for (int j = 0; j <= i; ++j) {
+        Scalar value = column(p, i, j, c);
+        if (j + 2 < 6) value = value + c.first * column(p, i, j + 2, c);
+        if (Order == 2 && j + 4 < 6) value = value + c.second * column(p, i, j + 4, c);
+        p(i, j) = value;
+      }
+    }
+    add_noise(p, dt);
+    belief.x = f(belief.x, dt);
+  }
+
+  /// P_xx + P_yy after dt seconds, without forming the rest of P.
+  Scalar position_variance(const Covariance& p, Scalar dt) const {
+    const Coefficients c(dt);
+    Scalar sum = Scalar(0);
+    for (int i = 0; i < 2; ++i) {
+      Scalar value = column(p, i, i, c) + c.first * column(p, i, i + 2, c);
+      if (Order == 2) value = value + c.second * column(p, i, i + 4, c);
+      sum = sum + value;
+    }
+    return sum + Scalar(2) * position_noise(dt);
+  }
+
+  Status check() const {
+    return valid(params.position) && valid(params.velocity) && valid(params.acceleration)
+               ? Status::kOk
+               : Status::kBadParameter;
+  }
+
+ private:
+  struct Coefficients {
+    Scalar first;   // dt
+    Scalar second;  // dt^2 / 2
+    explicit Coefficients(Scalar dt) : first(dt), second(Scalar(0.5) * dt * dt) {}
+  };
+
+  static bool valid(Scalar density) { return math::is_finite(density) && !(density < Scalar(0)); }
+
+  /// Element (i, j) of Phi P, from the lower triangle of P.
+  static AUVEST_INLINE Scalar column(const Covariance& p, int i, int j, const Coefficients& c) {
+    Scalar value = at(p, i, j);
+    if (i + 2 < 6) value = value + c.first * at(p, i + 2, j);
+    if (Order == 2 && i + 4 < 6) value = value + c.second * at(p, i + 4, j);
+    return value;
+  }
+
+  static AUVEST_INLINE Scalar at(const Covariance& p, int i, int j) {
+    return i >= j ? p(i, j) : p(j, i);
+  }
+
+  AUVEST_INLINE Scalar position_noise(Scalar dt) const {
+    if (Order == 1) return params.position * dt;
+    const Scalar dt2 = dt * dt;
+    return dt * (params.position +
+                 dt2 * (params.velocity / Scalar(3) + dt2 * (params.acceleration / Scalar(20))));
+  }
+
+  AUVEST_INLINE void add_noise(Covariance& p, Scalar dt) const {
+    const Scalar q_v = params.velocity;
+    const Scalar q_a = params.acceleration;
+    const Scalar dt2 = dt * dt;
+    const Scalar pp = position_noise(dt);
+    const Scalar vv = Order == 1 ? q_v * dt : dt * (q_v + dt2 * (q_a / Scalar(3)));
+    const Scalar aa = q_a * dt;
+    AUVEST_UNROLL
+    for (int i = 0; i < 2; ++i) {
+      p(i, i) = p(i, i) + pp;
+      p(i + 2, i + 2) = p(i + 2, i + 2) + vv;
+      p(i + 4, i + 4) = p(i + 4, i + 4) + aa;
+      if (Order == 2) {
+        p(i + 2, i) = p(i + 2, i) + dt2 * (q_v / Scalar(2) + dt2 * (q_a / Scalar(8)));
+        p(i + 4, i) = p(i + 4, i) + dt2 * dt * (q_a / Scalar(6));
+        p(i + 4, i + 2) = p(i + 4, i + 2) + dt2 * (q_a / Scalar(2));
+      }
+    }
+  }
+};
+
+/// The paper's model, exactly Eq. (4).
+template <class Scalar>
+using EulerAcceleration = ConstantAcceleration<Scalar, 1>;
+
+/// The exact discretisation of constant acceleration driven by white noise.
+template <class Scalar>
+using ExactAcceleration = ConstantAcceleration<Scalar, 2>;
+
+}  // namespace auvest

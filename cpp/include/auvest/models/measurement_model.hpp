@@ -1,0 +1,96 @@
+// What a filter asks of a measurement model, and the defaults a model inherits.
+//
+// A measurement model is a plain struct. It derives from
+// MeasurementModel<Itself, Scalar, N, M, Observed>, where the measurement depends on the first
+// `Observed` states only (leave it out if on all of them), and offers
+//
+//     Vector<Scalar, M>           h(x)   the measurement without noise
+//     Matrix<Scalar, M, M>        R()    covariance of its noise
+//     Matrix<Scalar, M, Observed> H(x)   Jacobian of h (EKF only)
+//     Status                      check()  kOk, or kBadParameter if a parameter is out of range
+//
+// It may override
+//
+//     residual(z, predicted)      z - predicted, wrapped where a component is an angle
+//     about(x)                    an expansion with deviations in closed form
+//     kClosedForm                 true if it does
+//     near_field(belief, z, view) true where h is useless at the scale of the belief; `view` is
+//                                 then the linear measurement to use instead
+#pragma once
+
+#include "auvest/math/linear_algebra.hpp"
+#include "auvest/status.hpp"
+#include "auvest/types.hpp"
+
+namespace auvest {
+
+/// A measurement reduced to its linear form about the belief:
+/// innovation = H (x_true - x)[0:Observed] + noise, noise ~ N(0, R).
+template <class Scalar, int M, int Observed>
+struct LinearView {
+  Vector<Scalar, M> innovation;
+  Matrix<Scalar, M, Observed> H;
+  Matrix<Scalar, M, M> R;
+};
+
+template <class Derived, class Scalar_, int N, int M, int Observed = N>
+struct MeasurementModel {
+  static_assert(0 < Observed && Observed <= N, "Observed counts leading states");
+  using Scalar = Scalar_;
+  using State = Vector<Scalar, N>;
+  using ObservedState = Vector<Scalar, Observed>;
+  using Measurement = Vector<Scalar, M>;
+  using Noise = Matrix<Scalar, M, M>;
+  using Jacobian = Matrix<Scalar, M, Observed>;
+  using View = LinearView<Scalar, M, Observed>;
+  static constexpr int kStates = N;
+  static constexpr int kSize = M;
+  static constexpr int kObserved = Observed;
+  static constexpr bool kClosedForm = false;
+
+  /// h about x, with deviations by subtraction (wrapped by `residual`).
+  struct NumericExpansion {
+    const Derived& model;
+    State x;
+    Measurement centre;
+
+    const Measurement& value() const { return centre; }
+    Jacobian H() const { return model.H(x); }
+
+    /// sum = d+ + d-, difference = d+ - d-, where d+- = h(x +- e) - h(x) and e moves the observed
+    /// states.
+    void deviations(const ObservedState& e, Measurement& sum, Measurement& difference) const {
+      State plus = x;
+      State minus = x;
+      for (int i = 0; i < Observed; ++i) {
+        plus(i) = x(i) + e(i);
+        minus(i) = x(i) - e(i);
+      }
+      const Measurement d_plus = model.residual(model.h(plus), centre);
+      const Measurement d_minus = model.residual(model.h(minus), centre);
+      for (int i = 0; i < M; ++i) {
+        sum(i) = d_plus(i) + d_minus(i);
+        difference(i) = d_plus(i) - d_minus(i);
+      }
+    }
+  };
+
+  NumericExpansion about(const State& x) const {
+    return NumericExpansion{derived(), x, derived().h(x)};
+  }
+
+  Measurement residual(const Measurement& z, const Measurement& predicted) const {
+    Measurement difference;
+    for (int i = 0; i < M; ++i) difference(i) = z(i) - predicted(i);
+    return difference;
+  }
+
+  bool near_field(const Belief<Scalar, N>&, const Measurement&, View&) const { return false; }
+
+  Status check() const { return Status::kOk; }
+
+ private:
+  const Derived& derived() const { return static_cast<const Derived&>(*this); }
+};
+
+}  // namespace auvest

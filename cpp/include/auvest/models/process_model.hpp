@@ -1,0 +1,74 @@
+// What a filter asks of a process model, and the defaults a model inherits.
+//
+// A process model is a plain struct. It derives from ProcessModel<Itself, Scalar, N> and offers
+//
+//     Vector<Scalar, N>    f(x, dt)    the state after dt seconds without noise
+//     Matrix<Scalar, N, N> Q(dt)       covariance of the process noise of those dt seconds
+//     Matrix<Scalar, N, N> Phi(x, dt)  Jacobian of f with respect to x (EKF only)
+//     Status               check()     kOk, or kBadParameter if a parameter is out of range
+//
+// It may override
+//
+//     about(x, dt)           an expansion with deviations in closed form (see NumericExpansion)
+//     kClosedForm            true if it does
+//     propagate(belief, dt)  x <- f, P <- Phi P Phi' + Q in place, from the structure of Phi
+//     kLinear                true if f is linear in x: the UKF then calls propagate, which is exact
+//     position_variance(...) trace of the position block of P after dt (interval policies)
+#pragma once
+
+#include "auvest/math/linear_algebra.hpp"
+#include "auvest/status.hpp"
+#include "auvest/types.hpp"
+
+namespace auvest {
+
+template <class Derived, class Scalar_, int N>
+struct ProcessModel {
+  using Scalar = Scalar_;
+  using State = Vector<Scalar, N>;
+  using Covariance = Matrix<Scalar, N, N>;
+  static constexpr int kStates = N;
+  static constexpr bool kLinear = false;
+  static constexpr bool kClosedForm = false;
+
+  /// f about x, with deviations by subtraction: f(x + e) - f(x) loses the digits that f(x) and
+  /// f(x + e) share, so filters limit how small alpha may be (see SigmaPoints).
+  struct NumericExpansion {
+    const Derived& model;
+    State x;
+    Scalar dt;
+    State centre;
+
+    const State& value() const { return centre; }
+
+    /// sum = d+ + d-, difference = d+ - d-, where d+- = f(x +- e) - f(x).
+    void deviations(const State& e, State& sum, State& difference) const {
+      const State plus = model.f(x + e, dt);
+      const State minus = model.f(x - e, dt);
+      for (int i = 0; i < N; ++i) {
+        sum(i) = (plus(i) - centre(i)) + (minus(i) - centre(i));
+        difference(i) = plus(i) - minus(i);
+      }
+    }
+  };
+
+  NumericExpansion about(const State& x, Scalar dt) const {
+    return NumericExpansion{derived(), x, dt, derived().f(x, dt)};
+  }
+
+  void propagate(Belief<Scalar, N>& belief, Scalar dt) const {
+    const Covariance noise = derived().Q(dt);
+    belief.P = math::symmetric_product(derived().Phi(belief.x, dt), belief.P);
+    for (int i = 0; i < N; ++i) {
+      for (int j = 0; j <= i; ++j) belief.P(i, j) = belief.P(i, j) + noise(i, j);
+    }
+    belief.x = derived().f(belief.x, dt);
+  }
+
+  Status check() const { return Status::kOk; }
+
+ private:
+  const Derived& derived() const { return static_cast<const Derived&>(*this); }
+};
+
+}  // namespace auvest

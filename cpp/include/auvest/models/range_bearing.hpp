@@ -1,0 +1,179 @@
+// Range and bearing from a fixed station, Eq. (6) of the AUKF paper (Deng, Yin, Duan 2019).
+//
+//   r = |D| + v_r,  bearing = atan2(D_y, D_x) + v_b,  D = (x, y) - station
+//
+// Differs from Eq. (6): atan2 where the paper prints arctan, and residuals wrapped to (-pi, pi].
+//
+// Deviations in closed form. With the complex number u = p + i q,
+//     p = D.e / |D|^2,   q = (D x e) / |D|^2,
+// a sigma point D + e is D (1 + u). Everything the unscented transform needs follows from
+// a+- = |1 +- u| and w = 1 - |u|^2, and nothing cancels (derived in docs/algorithms/ukf.md):
+//     range    d+ - d- = 4 |D| p / (a+ + a-)
+//              d+ + d- = 2 |D| g / (a+ + a- + 2),  g = a+ a- - w = 4 q^2 / (a+ a- + w)
+//     bearing  d+ - d- = arg((1 + u) conj(1 - u)) = atan2(2 q, w)
+//              d+ + d- = arg((1 + u)(1 - u))      = atan2(-2 p q, 1 - p^2 + q^2)
+// Seen from the station, the segment from D - e to D + e subtends less than pi, so none of these
+// angles needs wrapping.
+//
+// Near the station. Where the spread of the belief reaches the range, neither the slope of the
+// bearing at the mean nor a few points around it describe what was measured; at the station itself
+// the bearing is not even defined. There the measurement is taken as what it says about the
+// position, c = station + r (cos b, sin b), which is linear in the state. Its error has, along the
+// measured direction, the mean square sigma_r^2 + 3/4 r^2 sigma_b^4 and, across it,
+// (r^2 + sigma_r^2) sigma_b^2.
+#pragma once
+
+#include "auvest/math/angle.hpp"
+#include "auvest/math/trigonometry.hpp"
+#include "auvest/models/measurement_model.hpp"
+
+namespace auvest {
+
+template <class Scalar_, int N>
+struct RangeBearing : MeasurementModel<RangeBearing<Scalar_, N>, Scalar_, N, 2, 2> {
+  using Base = MeasurementModel<RangeBearing<Scalar_, N>, Scalar_, N, 2, 2>;
+  using Scalar = Scalar_;
+  using typename Base::Jacobian;
+  using typename Base::Measurement;
+  using typename Base::Noise;
+  using typename Base::ObservedState;
+  using typename Base::State;
+  using typename Base::View;
+  static constexpr bool kClosedForm = true;
+
+  struct Params {
+    Scalar station_x_m = Scalar(0.2);         ///< b_x, Table 1
+    Scalar station_y_m = Scalar(2);           ///< b_y, Table 1
+    Scalar sigma_range_m = Scalar(0.05);      ///< standard deviation of v_r (not in the paper)
+    Scalar sigma_bearing_rad = Scalar(0.01);  ///< standard deviation of v_b (not in the paper)
+    /// Position form below this many standard deviations sqrt(P_xx + P_yy) of range; 0: never, but
+    /// for ranges below 1e-15 m.
+    Scalar near_field = Scalar(3);
+  };
+
+  Params params;
+
+  explicit RangeBearing(const Params& p = Params()) : params(p) {}
+
+  struct Expansion {
+    Scalar dx, dy, range, inverse_square;
+    Measurement centre;
+
+    const Measurement& value() const { return centre; }
+
+    Jacobian H() const {
+      const Scalar inverse = Scalar(1) / range;
+      Jacobian jacobian;
+      jacobian(0, 0) = dx * inverse;
+      jacobian(0, 1) = dy * inverse;
+      jacobian(1, 0) = -(dy * inverse_square);
+      jacobian(1, 1) = dx * inverse_square;
+      return jacobian;
+    }
+
+    AUVEST_INLINE void deviations(const ObservedState& e, Measurement& sum,
+                                  Measurement& difference) const {
+      using math::atan2;
+      using math::sqrt;
+      const Scalar one = Scalar(1);
+      const Scalar two = Scalar(2);
+      const Scalar p = (dx * e(0) + dy * e(1)) * inverse_square;
+      const Scalar q = (dx * e(1) - dy * e(0)) * inverse_square;
+      const Scalar pp = p * p;
+      const Scalar qq = q * q;
+      const Scalar w = one - (pp + qq);
+      const Scalar a_plus = sqrt((one + p) * (one + p) + qq);
+      const Scalar a_minus = sqrt((one - p) * (one - p) + qq);
+      const Scalar a_sum = a_plus + a_minus;
+      const Scalar a_product = a_plus * a_minus;
+      const Scalar g = w > Scalar(0) ? Scalar(4) * qq / (a_product + w) : a_product - w;
+      sum(0) = two * range * g / (a_sum + two);
+      difference(0) = Scalar(4) * range * p / a_sum;
+      sum(1) = atan2(-(two * p * q), (one - pp) + qq);
+      difference(1) = atan2(two * q, w);
+    }
+  };
+
+  AUVEST_INLINE Expansion about(const State& x) const {
+    using math::atan2;
+    using math::sqrt;
+    Expansion point;
+    point.dx = x(0) - params.station_x_m;
+    point.dy = x(1) - params.station_y_m;
+    const Scalar square = point.dx * point.dx + point.dy * point.dy;
+    point.range = sqrt(square);
+    point.inverse_square = Scalar(1) / square;
+    point.centre(0) = point.range;
+    point.centre(1) = atan2(point.dy, point.dx);
+    return point;
+  }
+
+  /// Eq. (6) without noise; at the station itself range 0 and bearing 0.
+  Measurement h(const State& x) const {
+    using math::atan2;
+    using math::sqrt;
+    const Scalar dx = x(0) - params.station_x_m;
+    const Scalar dy = x(1) - params.station_y_m;
+    Measurement z;
+    z(0) = sqrt(dx * dx + dy * dy);
+    z(1) = atan2(dy, dx);
+    return z;
+  }
+
+  Jacobian H(const State& x) const { return about(x).H(); }
+
+  Noise R() const {
+    Noise noise;
+    noise(0, 0) = params.sigma_range_m * params.sigma_range_m;
+    noise(1, 0) = noise(0, 1) = Scalar(0);
+    noise(1, 1) = params.sigma_bearing_rad * params.sigma_bearing_rad;
+    return noise;
+  }
+
+  Measurement residual(const Measurement& z, const Measurement& predicted) const {
+    Measurement difference;
+    difference(0) = z(0) - predicted(0);
+    difference(1) = math::wrap(z(1) - predicted(1));
+    return difference;
+  }
+
+  AUVEST_INLINE bool near_field(const Belief<Scalar, N>& belief, const Measurement& z,
+                                View& view) const {
+    const Scalar dx = belief.x(0) - params.station_x_m;
+    const Scalar dy = belief.x(1) - params.station_y_m;
+    const Scalar square = dx * dx + dy * dy;
+    const Scalar reach = params.near_field * params.near_field * (belief.P(0, 0) + belief.P(1, 1));
+    if (square > reach && square > Scalar(1e-30)) return false;
+    position_view(dx, dy, z, view);
+    return true;
+  }
+
+  Status check() const {
+    const bool valid = math::is_finite(params.station_x_m) && math::is_finite(params.station_y_m) &&
+                       math::is_finite(params.sigma_range_m) && params.sigma_range_m > Scalar(0) &&
+                       math::is_finite(params.sigma_bearing_rad) &&
+                       params.sigma_bearing_rad > Scalar(0) && math::is_finite(params.near_field) &&
+                       !(params.near_field < Scalar(0));
+    return valid ? Status::kOk : Status::kBadParameter;
+  }
+
+ private:
+  void position_view(Scalar dx, Scalar dy, const Measurement& z, View& view) const {
+    Scalar sine, cosine;
+    math::sincos(z(1), sine, cosine);
+    const Scalar range2 = z(0) * z(0);
+    const Scalar var_range = params.sigma_range_m * params.sigma_range_m;
+    const Scalar var_bearing = params.sigma_bearing_rad * params.sigma_bearing_rad;
+    const Scalar along = var_range + Scalar(0.75) * range2 * var_bearing * var_bearing;
+    const Scalar across = (range2 + var_range) * var_bearing;
+    view.innovation(0) = z(0) * cosine - dx;
+    view.innovation(1) = z(0) * sine - dy;
+    view.H(0, 0) = view.H(1, 1) = Scalar(1);
+    view.H(0, 1) = view.H(1, 0) = Scalar(0);
+    view.R(0, 0) = along * cosine * cosine + across * sine * sine;
+    view.R(1, 0) = view.R(0, 1) = (along - across) * cosine * sine;
+    view.R(1, 1) = along * sine * sine + across * cosine * cosine;
+  }
+};
+
+}  // namespace auvest

@@ -1,0 +1,44 @@
+// What an operation reports. Failure is a value: on anything but kOk the object is unchanged.
+#pragma once
+
+#include <cstdint>
+
+#include "auvest/config.hpp"
+
+namespace auvest {
+
+enum class Status : std::uint8_t {
+  kOk = 0,
+  kNotInitialised,       ///< no belief yet: reset(x0, P0) was not called or was refused
+  kNotFinite,            ///< an argument is NaN or infinite
+  kTimeBackwards,        ///< dt < 0
+  kBadParameter,         ///< a parameter lies outside its stated range
+  kNotPositiveDefinite,  ///< P or R is not symmetric positive definite
+  kAlphaTooSmall,        ///< alpha cancels all digits of a model without closed-form deviations
+  kOverflow              ///< the result would not be finite
+};
+
+/// One line of English for each status, without a full stop.
+inline const char* describe(Status status) {
+  switch (status) {
+    case Status::kOk:
+      return "ok";
+    case Status::kNotInitialised:
+      return "the filter has no belief yet; call reset(x0, P0) first";
+    case Status::kNotFinite:
+      return "an argument is NaN or infinite";
+    case Status::kTimeBackwards:
+      return "dt is negative: time cannot go backwards";
+    case Status::kBadParameter:
+      return "a parameter lies outside its stated range";
+    case Status::kNotPositiveDefinite:
+      return "the covariance is not symmetric positive definite";
+    case Status::kAlphaTooSmall:
+      return "alpha is too small for a model without closed-form deviations in this precision";
+    case Status::kOverflow:
+      return "the result would not be finite";
+  }
+  return "unknown status";
+}
+
+}  // namespace auvest

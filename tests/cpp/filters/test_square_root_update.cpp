@@ -1,0 +1,118 @@
+#include "auvest/filters/square_root_update.hpp"
+
+#include <doctest/doctest.h>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+
+#include "auvest/math/random.hpp"
+
+namespace {
+
+using auvest::Belief;
+using auvest::Correction;
+using auvest::Matrix;
+using auvest::Status;
+using auvest::Vector;
+
+template <class Scalar, int N, int M>
+Matrix<Scalar, N, M> random_matrix(auvest::math::Random& random, double scale) {
+  Matrix<Scalar, N, M> a;
+  for (int i = 0; i < N; ++i) {
+    for (int j = 0; j < M; ++j) a(i, j) = Scalar(scale * random.normal<double>());
+  }
+  return a;
+}
+
+/// Against x + K r, P - K S K' and r' S^-1 r, for H that sees the first O of N states.
+template <int N, int M, int O>
+void check_against_textbook() {
+  auvest::math::Random random(N * 100 + M * 10 + O);
+  for (int trial = 0; trial < 50; ++trial) {
+    const Matrix<double, N, N> root = random_matrix<double, N, N>(random, 1);
+    const Matrix<double, N, N> p =
+        root * root.transpose() + 0.1 * Matrix<double, N, N>::Identity();
+    const Matrix<double, M, M> noise_root = random_matrix<double, M, M>(random, 0.3);
+    const Matrix<double, M, M> noise =
+        noise_root * noise_root.transpose() + 0.01 * Matrix<double, M, M>::Identity();
+    const Matrix<double, M, O> h = random_matrix<double, M, O>(random, 1);
+    Matrix<double, M, N> full = Matrix<double, M, N>::Zero();
+    full.template leftCols<O>() = h;
+
+    Belief<double, N> belief;
+    belief.x = random_matrix<double, N, 1>(random, 1);
+    belief.P = p;
+    const Vector<double, N> x = belief.x;
+    Correction<double, M> correction(Status::kOk);
+    correction.innovation = random_matrix<double, M, 1>(random, 1);
+
+    REQUIRE(auvest::math::partial_cholesky<O>(belief.P));
+    Matrix<double, O, O> l = Matrix<double, O, O>::Zero();
+    for (int i = 0; i < O; ++i) {
+      for (int j = 0; j <= i; ++j) l(i, j) = belief.P(i, j);
+    }
+    const Matrix<double, O, M> a = (h * l).transpose();
+    REQUIRE(auvest::square_root_update<M>(belief, a, noise, correction) == Status::kOk);
+
+    const Matrix<double, M, M> s = full * p * full.transpose() + noise;
+    const Matrix<double, N, M> gain = p * full.transpose() * s.inverse();
+    const Vector<double, N> expected_x = x + gain * correction.innovation;
+    const Matrix<double, N, N> expected_p = p - gain * s * gain.transpose();
+    for (int i = 0; i < N; ++i) {
+      CHECK(std::fabs(belief.x(i) - expected_x(i)) < 1e-11);
+      for (int j = 0; j <= i; ++j) {
+        CHECK(std::fabs(belief.P(i, j) - expected_p(i, j)) < 1e-12 * p.trace());
+      }
+    }
+    CHECK((correction.S - s).cwiseAbs().maxCoeff() < 1e-12 * s.trace());
+    CHECK(correction.nis == doctest::Approx(correction.innovation.dot(
+                                s.inverse() * correction.innovation)).epsilon(1e-9));
+  }
+}
+
+TEST_CASE("square-root update: equals P - K S K'") {
+  check_against_textbook<1, 1, 1>();
+  check_against_textbook<6, 2, 2>();
+  check_against_textbook<6, 1, 2>();
+  check_against_textbook<6, 2, 6>();
+  check_against_textbook<4, 3, 3>();
+  check_against_textbook<3, 5, 2>();
+}
+
+TEST_CASE("square-root update: float stays positive where P - K S K' does not") {
+  // A prior of 1 km against a sensor of 1 mm: 1 - k h is 1e-12, below the resolution of float.
+  Belief<float, 2> belief;
+  belief.x.setZero();
+  belief.P << 1e6f, 0, 9.9e5f, 1e6f;
+  REQUIRE(auvest::math::partial_cholesky<2>(belief.P));
+  Matrix<float, 2, 1> a;
+  a << belief.P(0, 0), 0;  // H = (1, 0)
+  Matrix<float, 1, 1> noise;
+  noise << 1e-6f;
+  Correction<float, 1> correction(Status::kOk);
+  correction.innovation << 5;
+  REQUIRE(auvest::square_root_update<1>(belief, a, noise, correction) == Status::kOk);
+  // Closed form: P_00 = R to 1e-12, P_11 = P_11 - P_10^2 / P_00 = 1e6 - 9.801e5 = 19900.
+  CHECK(belief.P(0, 0) > 0);
+  CHECK(belief.P(0, 0) < 1e-2f);
+  CHECK(belief.P(1, 1) == doctest::Approx(19900).epsilon(1e-3));
+  CHECK(belief.P(0, 0) * belief.P(1, 1) >= belief.P(1, 0) * belief.P(1, 0));
+  CHECK(belief.x(0) == doctest::Approx(5));
+  CHECK(belief.x(1) == doctest::Approx(5 * 0.99));
+}
+
+TEST_CASE("square-root update: an indefinite noise is refused") {
+  Belief<double, 1> belief;
+  belief.x << 0;
+  belief.P << 1;
+  const Matrix<double, 1, 1> a = Matrix<double, 1, 1>::Identity();
+  for (const double bad : {0.0, -1.0, std::nan("")}) {
+    Matrix<double, 1, 1> noise;
+    noise << bad;
+    Correction<double, 1> correction(Status::kOk);
+    CHECK(auvest::square_root_update<1>(belief, a, noise, correction) ==
+          Status::kNotPositiveDefinite);
+  }
+}
+
+}  // namespace

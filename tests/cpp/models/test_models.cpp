@@ -1,0 +1,370 @@
+// One suite for every model: registering a line below gives Jacobian, deviations, wrap-around and
+// noiseless convergence checks.
+#include <doctest/doctest.h>
+
+#include <cmath>
+
+#include "auvest/filters/ekf.hpp"
+#include "auvest/filters/ukf.hpp"
+#include "auvest/math/random.hpp"
+#include "auvest/models/constant_acceleration.hpp"
+#include "auvest/models/linear.hpp"
+#include "auvest/models/range_bearing.hpp"
+
+namespace {
+
+using auvest::Belief;
+using auvest::Matrix;
+using auvest::Vector;
+using auvest::math::Random;
+
+template <int N>
+Vector<double, N> random_state(Random& random, double scale) {
+  Vector<double, N> x;
+  for (int i = 0; i < N; ++i) x(i) = scale * random.normal<double>();
+  return x;
+}
+
+template <class Model>
+void check_process(const Model& model, double dt) {
+  constexpr int n = Model::kStates;
+  Random random(7);
+  for (int trial = 0; trial < 20; ++trial) {
+    const auto x = random_state<n>(random, 10);
+    // Phi is the Jacobian of f: central differences, exact but for rounding where f is linear.
+    const auto phi = model.Phi(x, dt);
+    const double step = 1e-4;
+    for (int j = 0; j < n; ++j) {
+      Vector<double, n> up = x;
+      Vector<double, n> down = x;
+      up(j) += step;
+      down(j) -= step;
+      const Vector<double, n> slope = (model.f(up, dt) - model.f(down, dt)) / (2 * step);
+      for (int i = 0; i < n; ++i) CHECK(std::fabs(phi(i, j) - slope(i)) < 1e-7);
+    }
+    // propagate is Phi P Phi' + Q, written from the structure of Phi.
+    Belief<double, n> belief;
+    Matrix<double, n, n> a;
+    for (int i = 0; i < n; ++i) {
+      for (int j = 0; j < n; ++j) a(i, j) = random.normal<double>();
+    }
+    belief.x = x;
+    belief.P = a * a.transpose();
+    const Matrix<double, n, n> expected = phi * belief.P * phi.transpose() + model.Q(dt);
+    model.propagate(belief, dt);
+    for (int i = 0; i < n; ++i) {
+      CHECK(belief.x(i) == doctest::Approx(model.f(x, dt)(i)));
+      for (int j = 0; j <= i; ++j) {
+        CHECK(std::fabs(belief.P(i, j) - expected(i, j)) < 1e-13 * expected.trace());
+      }
+    }
+    // Q is symmetric and positive semidefinite: v' Q v >= 0.
+    const auto q = model.Q(dt);
+    const auto v = random_state<n>(random, 1);
+    CHECK((q - q.transpose()).cwiseAbs().maxCoeff() == 0);
+    CHECK(v.dot(q * v) >= 0);
+  }
+}
+
+template <class Model>
+void check_measurement(const Model& model, double scale) {
+  constexpr int n = Model::kStates;
+  constexpr int m = Model::kSize;
+  constexpr int o = Model::kObserved;
+  Random random(11);
+  for (int trial = 0; trial < 50; ++trial) {
+    const auto x = random_state<n>(random, scale);
+    const auto point = model.about(x);
+    // The expansion's value is h.
+    for (int i = 0; i < m; ++i) CHECK(point.value()(i) == model.h(x)(i));
+    // H is the Jacobian of h, residuals taken as the model takes them.
+    const auto jacobian = model.H(x);
+    const double step = 1e-5 * scale;
+    for (int j = 0; j < n; ++j) {
+      Vector<double, n> up = x;
+      Vector<double, n> down = x;
+      up(j) += step;
+      down(j) -= step;
+      const auto difference = model.residual(model.h(up), model.h(down));
+      for (int i = 0; i < m; ++i) {
+        const double slope = difference(i) / (2 * step);
+        CHECK(std::fabs((j < o ? jacobian(i, j) : 0.0) - slope) < 1e-5);
+      }
+    }
+    // Deviations are those of h: in long double, where subtraction keeps enough digits.
+    for (const double size : {1.0, 0.1, 1e-3}) {
+      typename Model::ObservedState e;
+      for (int i = 0; i < o; ++i) e(i) = size * scale * 0.1 * random.normal<double>();
+      typename Model::Measurement sum;
+      typename Model::Measurement difference;
+      point.deviations(e, sum, difference);
+      typename Model::State plus = x;
+      typename Model::State minus = x;
+      for (int i = 0; i < o; ++i) {
+        plus(i) += e(i);
+        minus(i) -= e(i);
+      }
+      const auto d_plus = model.residual(model.h(plus), model.h(x));
+      const auto d_minus = model.residual(model.h(minus), model.h(x));
+      for (int i = 0; i < m; ++i) {
+        CHECK(std::fabs(sum(i) - (d_plus(i) + d_minus(i))) < 1e-13 * scale + 1e-14);
+        CHECK(std::fabs(difference(i) - (d_plus(i) - d_minus(i))) < 1e-13 * scale + 1e-14);
+      }
+    }
+  }
+}
+
+template <class Model>
+void check_position_variance(const Model& model, const Belief<double, 6>& before) {
+  Belief<double, 6> after = before;
+  model.propagate(after, 0.7);
+  CHECK(model.position_variance(before.P, 0.7) ==
+        doctest::Approx(after.P(0, 0) + after.P(1, 1)).epsilon(1e-14));
+}
+
+/// A filter fed with noise-free measurements of a standing target must end on it.
+template <class Filter, class Model>
+void check_convergence(Filter filter, const Model& model, const Vector<double, 6>& truth) {
+  Vector<double, 6> x = truth;
+  x(0) += 0.3;
+  x(1) -= 0.2;
+  Matrix<double, 6, 6> P = Matrix<double, 6, 6>::Identity();
+  REQUIRE(filter.reset(x, P) == auvest::Status::kOk);
+  for (int k = 0; k < 400; ++k) {
+    REQUIRE(filter.predict(0.5) == auvest::Status::kOk);
+    REQUIRE(filter.update(model.h(truth), model).status == auvest::Status::kOk);
+  }
+  CHECK(std::fabs(filter.x()(0) - truth(0)) < 1e-3);
+  CHECK(std::fabs(filter.x()(1) - truth(1)) < 1e-3);
+}
+
+auvest::RangeBearing<double, 6> sonar() {
+  auvest::RangeBearing<double, 6>::Params p;
+  p.station_x_m = 0.2;
+  p.station_y_m = 2;
+  return auvest::RangeBearing<double, 6>(p);
+}
+
+using View = auvest::RangeBearing<double, 6>::View;
+
+View empty_view() {
+  View view;
+  view.innovation.setZero();
+  view.H.setZero();
+  view.R.setZero();
+  return view;
+}
+
+TEST_CASE("process models") {
+  check_process(auvest::EulerAcceleration<double>(), 0.5);
+  check_process(auvest::ExactAcceleration<double>(), 0.5);
+  check_process(auvest::ExactAcceleration<double>(), 30);
+  Matrix<double, 3, 3> phi;
+  phi << 1, 0.5, 0, 0, 1, 0.5, 0.1, 0, 0.9;
+  check_process(auvest::LinearProcess<double, 3>(phi, Matrix<double, 3, 3>::Identity()), 1);
+}
+
+TEST_CASE("measurement models") {
+  check_measurement(sonar(), 100);
+  Matrix<double, 2, 3> h;
+  h << 1, -1, 0.5, 0, 2, 1;
+  check_measurement(
+      auvest::LinearMeasurement<double, 5, 2, 3>(h, Matrix<double, 2, 2>::Identity()), 10);
+}
+
+TEST_CASE("noiseless convergence, also across the bearing's cut") {
+  using Process = auvest::ExactAcceleration<double>;
+  for (const double y : {-5.0, 2.0, 2.01, 1.99}) {  // y = 2 with x < 0.2: bearing pi
+    Vector<double, 6> truth = Vector<double, 6>::Zero();
+    truth(0) = -8;
+    truth(1) = y;
+    check_convergence(auvest::Ekf<Process>(Process()), sonar(), truth);
+    check_convergence(auvest::Ukf<Process>(Process()), sonar(), truth);
+  }
+}
+
+TEST_CASE("constant acceleration: Eq. (4) has no dt^2/2 term, the exact model has") {
+  Vector<double, 6> x;
+  x << 1, 2, 3, 4, 5, 6;
+  const auto euler = auvest::EulerAcceleration<double>().f(x, 2);
+  const auto exact = auvest::ExactAcceleration<double>().f(x, 2);
+  const double expected_euler[6] = {7, 10, 13, 16, 5, 6};
+  const double expected_exact[6] = {17, 22, 13, 16, 5, 6};
+  for (int i = 0; i < 6; ++i) {
+    CHECK(euler(i) == expected_euler[i]);
+    CHECK(exact(i) == expected_exact[i]);
+  }
+}
+
+TEST_CASE("constant acceleration: exact steps compose, Euler steps do not") {
+  // Two exact steps of 1 s are one of 2 s, in the mean, in Phi P Phi' and in Q (Chapman-Kolmogorov).
+  const auvest::ExactAcceleration<double> model;
+  Belief<double, 6> twice;
+  twice.x << 1, 2, 3, 4, 5, 6;
+  twice.P = Matrix<double, 6, 6>::Identity();
+  Belief<double, 6> once = twice;
+  model.propagate(twice, 1);
+  model.propagate(twice, 1);
+  model.propagate(once, 2);
+  for (int i = 0; i < 6; ++i) {
+    CHECK(twice.x(i) == doctest::Approx(once.x(i)).epsilon(1e-14));
+    for (int j = 0; j <= i; ++j) {
+      CHECK(twice.P(i, j) == doctest::Approx(once.P(i, j)).epsilon(1e-13));
+    }
+  }
+}
+
+TEST_CASE("constant acceleration: position_variance is the trace that propagate would give") {
+  Random random(5);
+  Belief<double, 6> belief;
+  Matrix<double, 6, 6> a;
+  for (int i = 0; i < 6; ++i) {
+    for (int j = 0; j < 6; ++j) a(i, j) = random.normal<double>();
+  }
+  belief.x.setZero();
+  belief.P = a * a.transpose();
+  check_position_variance(auvest::EulerAcceleration<double>(), belief);
+  check_position_variance(auvest::ExactAcceleration<double>(), belief);
+}
+
+TEST_CASE("range and bearing: closed second differences against long double") {
+  // The sum d+ + d- is of second order: for small e it must keep its own digits, in float too.
+  Random random(13);
+  for (int trial = 0; trial < 200; ++trial) {
+    auvest::RangeBearing<float, 6>::Params p;
+    p.station_x_m = 0;
+    p.station_y_m = 0;
+    const auvest::RangeBearing<float, 6> model(p);
+    Vector<float, 6> x = Vector<float, 6>::Zero();
+    x(0) = 500.0f * random.normal<float>();
+    x(1) = 500.0f * random.normal<float>();
+    Vector<float, 2> e;
+    e(0) = 1e-5f * random.normal<float>();
+    e(1) = 1e-5f * random.normal<float>();
+    Vector<float, 2> sum;
+    Vector<float, 2> difference;
+    model.about(x).deviations(e, sum, difference);
+
+    // Second-order Taylor terms, right to 1e-14 relative at |e| / |D| of 1e-7.
+    const double dx = x(0), dy = x(1), ex = e(0), ey = e(1);
+    const double r = std::hypot(dx, dy);
+    const double along = (dx * ex + dy * ey) / r;
+    const double across = (dx * ey - dy * ex) / r;
+    const double range_sum = across * across / r;
+    const double bearing_sum = -2 * along * across / (r * r);
+    // p and q carry the rounding of two products each, relative to |e|; the sums are products of
+    // them. 16 ulp of float on the scale of |e|^2 covers that chain of about ten operations.
+    const double tolerance = 16 * 6e-8 * (ex * ex + ey * ey);
+    CHECK(std::fabs(double(sum(0)) - range_sum) < tolerance / r);
+    CHECK(std::fabs(double(sum(1)) - bearing_sum) < 2 * tolerance / (r * r));
+    CHECK(std::fabs(double(difference(0)) - 2 * along) < 16 * 6e-8 * std::hypot(ex, ey));
+    CHECK(std::fabs(double(difference(1)) - 2 * across / r) < 16 * 6e-8 * std::hypot(ex, ey) / r);
+  }
+}
+
+TEST_CASE("range and bearing: sigma points beyond the station") {
+  // |e| > |D|: the far point lies on the other side of the station (w <= 0).
+  auvest::RangeBearing<double, 6>::Params p;
+  p.station_x_m = 0;
+  p.station_y_m = 0;
+  const auvest::RangeBearing<double, 6> model(p);
+  Vector<double, 6> x = Vector<double, 6>::Zero();
+  x(0) = 1;
+  for (const double angle : {0.3, 1.0, 2.0, 3.0, -0.7, -2.9}) {
+    Vector<double, 2> e;
+    e << 3 * std::cos(angle), 3 * std::sin(angle);
+    Vector<double, 2> sum;
+    Vector<double, 2> difference;
+    model.about(x).deviations(e, sum, difference);
+    const double r_plus = std::hypot(1 + e(0), e(1));
+    const double r_minus = std::hypot(1 - e(0), e(1));
+    const double b_plus = std::atan2(e(1), 1 + e(0));
+    const double b_minus = std::atan2(-e(1), 1 - e(0));
+    CHECK(sum(0) == doctest::Approx(r_plus + r_minus - 2).epsilon(1e-14));
+    CHECK(difference(0) == doctest::Approx(r_plus - r_minus).epsilon(1e-14));
+    CHECK(sum(1) == doctest::Approx(b_plus + b_minus).epsilon(1e-13));
+    CHECK(difference(1) == doctest::Approx(b_plus - b_minus).epsilon(1e-13));
+  }
+}
+
+TEST_CASE("range and bearing: the near field begins where the belief reaches the station") {
+  const auto model = sonar();
+  Belief<double, 6> belief;
+  belief.x.setZero();
+  belief.x(0) = 0.2 + 1;  // 1 m from the station
+  belief.x(1) = 2;
+  belief.P.setIdentity();
+  const Vector<double, 2> z(1.1, 0.4);
+  View view = empty_view();
+  belief.P(0, 0) = belief.P(1, 1) = 0.99 / 18;  // sqrt(P_xx + P_yy) = 0.9949 / 3
+  CHECK_FALSE(model.near_field(belief, z, view));
+  belief.P(0, 0) = belief.P(1, 1) = 1.01 / 18;
+  REQUIRE(model.near_field(belief, z, view));
+  // The measured position minus the believed one.
+  CHECK(view.innovation(0) == doctest::Approx(1.1 * std::cos(0.4) - 1));
+  CHECK(view.innovation(1) == doctest::Approx(1.1 * std::sin(0.4)));
+}
+
+TEST_CASE("range and bearing: covariance of the position form, by Monte Carlo") {
+  // Truth at r = 2 m with wide noise; the form's mean square error along and across the measured
+  // direction, over 4e5 draws (standard error of a variance: 0.22 %).
+  auvest::RangeBearing<double, 6>::Params p;
+  p.station_x_m = 0;
+  p.station_y_m = 0;
+  p.sigma_range_m = 0.3;
+  p.sigma_bearing_rad = 0.2;
+  const auvest::RangeBearing<double, 6> model(p);
+  Random random(3);
+  const int n = 400000;
+  double along = 0, across = 0, predicted_along = 0, predicted_across = 0;
+  for (int k = 0; k < n; ++k) {
+    double v_r, v_b;
+    random.normal_pair(v_r, v_b);
+    const Vector<double, 2> z(2 + 0.3 * v_r, 0.2 * v_b);
+    Belief<double, 6> belief;
+    belief.x.setZero();
+    belief.x(0) = 2;
+    belief.P.setIdentity();
+    View view = empty_view();
+    REQUIRE(model.near_field(belief, z, view));
+    const double c = std::cos(z(1)), s = std::sin(z(1));
+    const double u = c * view.innovation(0) + s * view.innovation(1);
+    const double v = -s * view.innovation(0) + c * view.innovation(1);
+    along += u * u;
+    across += v * v;
+    predicted_along +=
+        c * c * view.R(0, 0) + 2 * c * s * view.R(1, 0) + s * s * view.R(1, 1);
+    predicted_across +=
+        s * s * view.R(0, 0) - 2 * c * s * view.R(1, 0) + c * c * view.R(1, 1);
+  }
+  // Terms of the order sigma_b^4 r^2 are dropped from `across` (sin^2 against angle^2: 4 %) and
+  // E[r_measured^2] = r^2 + sigma_r^2 counts sigma_r^2 twice there (2 %).
+  CHECK(along / n == doctest::Approx(predicted_along / n).epsilon(0.02));
+  CHECK(across / n == doctest::Approx(predicted_across / n).epsilon(0.10));
+}
+
+TEST_CASE("models refuse bad parameters") {
+  const double nan = std::nan("");
+  const auto range_bearing = [](double sx, double sr, double sb, double near) {
+    auvest::RangeBearing<double, 6>::Params p;
+    p.station_x_m = sx;
+    p.sigma_range_m = sr;
+    p.sigma_bearing_rad = sb;
+    p.near_field = near;
+    return auvest::RangeBearing<double, 6>(p).check();
+  };
+  CHECK(range_bearing(0, 1, 1, 0) == auvest::Status::kOk);
+  CHECK(range_bearing(nan, 1, 1, 0) == auvest::Status::kBadParameter);
+  CHECK(range_bearing(0, 0, 1, 0) == auvest::Status::kBadParameter);
+  CHECK(range_bearing(0, -1, 1, 0) == auvest::Status::kBadParameter);
+  CHECK(range_bearing(0, 1, nan, 0) == auvest::Status::kBadParameter);
+  CHECK(range_bearing(0, 1, 0, 0) == auvest::Status::kBadParameter);
+  CHECK(range_bearing(0, 1, 1, -1) == auvest::Status::kBadParameter);
+  auvest::AccelerationNoise<double> noise;
+  noise.velocity = -1;
+  CHECK(auvest::ExactAcceleration<double>(noise).check() == auvest::Status::kBadParameter);
+  noise.velocity = nan;
+  CHECK(auvest::EulerAcceleration<double>(noise).check() == auvest::Status::kBadParameter);
+}
+
+}  // namespace
