@@ -1,0 +1,44 @@
+#include "auvest/math/random.hpp"
+#include "binders.hpp"
+
+namespace auvest {
+namespace bindings {
+namespace {
+
+template <class Scalar, class Draw>
+py::array_t<Scalar> filled(py::ssize_t count, Draw draw) {
+  if (count < 0) throw py::value_error("count must not be negative");
+  py::array_t<Scalar> result(count);
+  Scalar* out = result.mutable_data();
+  for (py::ssize_t i = 0; i < count; ++i) out[i] = draw();
+  return result;
+}
+
+template <class Scalar>
+void bind_precision(py::class_<math::Random>& c) {
+  c.def(
+      named<Scalar>("uniform").c_str(),
+      [](math::Random& random, py::ssize_t count) {
+        return filled<Scalar>(count, [&random] { return random.uniform<Scalar>(); });
+      },
+      py::arg("count"), "Uniform deviates in [0, 1).");
+  c.def(
+      named<Scalar>("normal").c_str(),
+      [](math::Random& random, py::ssize_t count) {
+        return filled<Scalar>(count, [&random] { return random.normal<Scalar>(); });
+      },
+      py::arg("count"), "Standard normal deviates.");
+}
+
+}  // namespace
+
+void bind_random(py::module_& m) {
+  py::class_<math::Random> c(m, "Random", "xoshiro128++: the same stream on every target.");
+  c.def(py::init<std::uint64_t, std::uint64_t>(), py::arg("seed"), py::arg("stream") = 0);
+  c.def("next_u32", &math::Random::next_u32, "32 random bits.");
+  bind_precision<float>(c);
+  bind_precision<double>(c);
+}
+
+}  // namespace bindings
+}  // namespace auvest
