@@ -12,7 +12,8 @@ void bind_tracking(py::module_& m) {
   using Vector2 = std::array<double, 2>;
   py::class_<Track>(m, "Track", "The true and desired track of the tracking scenario.")
       .def(py::init([](const std::string& kind, const Vector2& position, const Vector2& velocity,
-                       const Vector2& acceleration, double turn_rate) {
+                       const Vector2& acceleration, double turn_rate, double wander_m,
+                       double wander_period_s) {
              Track track;
              if (kind == "euler") {
                track.kind = Track::Kind::kEuler;
@@ -29,10 +30,12 @@ void bind_tracking(py::module_& m) {
                track.acceleration[i] = acceleration[i];
              }
              track.turn_rate = turn_rate;
+             track.wander_m = wander_m;
+             track.wander_period_s = wander_period_s;
              return track;
            }),
            py::arg("kind"), py::arg("position"), py::arg("velocity"), py::arg("acceleration"),
-           py::arg("turn_rate"))
+           py::arg("turn_rate"), py::arg("wander_m"), py::arg("wander_period_s"))
       .def("advance", &Track::advance, py::arg("dt"))
       .def_property_readonly("position", [](const Track& t) {
         return Vector2{t.position[0], t.position[1]};
@@ -44,6 +47,8 @@ void bind_tracking(py::module_& m) {
     result["velocity"] = Vector2{t.velocity[0], t.velocity[1]};
     result["acceleration"] = Vector2{t.acceleration[0], t.acceleration[1]};
     result["turn_rate"] = t.turn_rate;
+    result["wander_m"] = t.wander_m;
+    result["wander_period_s"] = t.wander_period_s;
     return result;
   });
   m.def("noise_defaults", [] {

@@ -110,7 +110,7 @@ class FilterBinder {
       }
       nothing.nis = nan;
       for (; done < rows; ++done) {
-        const Adaptive before = filter;
+        const typename Adaptive::BeliefType before = filter.belief();
         const Scalar elapsed = math::is_nan(dt_in[done]) ? filter.interval() : dt_in[done];
         status = filter.predict(elapsed);
         Update u = nothing;
@@ -131,7 +131,7 @@ class FilterBinder {
           status = filter.feedback(desired);
         }
         if (status != Status::kOk) {
-          filter = before;
+          filter.Filter::restore(before);
           break;
         }
         copy_to(filter.x(), x_out + done * kStates);
@@ -170,6 +170,7 @@ class FilterBinder {
     const auto runs = scenario["runs"].cast<py::ssize_t>();
     const auto steps = scenario["steps"].cast<py::ssize_t>();
     const auto duration_s = scenario["duration_s"].cast<double>();
+    const auto random_start = scenario["random_start"].cast<bool>();
     TrackingProbe probe;
     probe.period_s = scenario["probe_period_s"].cast<double>();
     probe.budget_m = scenario["budget_m"].cast<double>();
@@ -211,7 +212,8 @@ class FilterBinder {
         typename Adaptive::Position start;
         start(0) = static_cast<Scalar>(truth.position[0]);
         start(1) = static_cast<Scalar>(truth.position[1]);
-        Status result = filter.reset(state, covariance, start);
+        Status result = filter.reset(random_start ? deviate(state, covariance, random) : state,
+                                     covariance, start);
         if (result == Status::kOk) {
           result = track(filter, sensor, truth, noise, random, static_cast<std::uint32_t>(steps),
                          duration_s, seen, [&](const TrackingStep<Adaptive, kSize>& step) {
@@ -258,6 +260,25 @@ class FilterBinder {
     result["probe_above"] = probe_above;
     result["probe_count"] = probe_count;
     return result;
+  }
+
+  /// A draw from N(x, P): six normal deviates, in pairs.
+  static typename Adaptive::State deviate(typename Adaptive::State x,
+                                          typename Adaptive::Covariance p, math::Random& random) {
+    static_assert(kStates % 2 == 0, "deviates come in pairs");
+    if (!math::partial_cholesky<kStates>(p)) return x;  // reset refuses P and says why
+    typename Adaptive::State normal;
+    for (int i = 0; i < kStates; i += 2) {
+      double first = 0;
+      double second = 0;
+      random.normal_pair(first, second);
+      normal(i) = static_cast<Scalar>(first);
+      normal(i + 1) = static_cast<Scalar>(second);
+    }
+    for (int i = 0; i < kStates; ++i) {
+      for (int j = 0; j <= i; ++j) x(i) = x(i) + p(i, j) * normal(j);
+    }
+    return x;
   }
 
   static py::dict memory(const Policy& policy) {

@@ -1,9 +1,8 @@
 // The filters compile with a scalar that converts to nothing, and compute the bits of double.
-#include "explicit_scalar.hpp"
-
 #include <doctest/doctest.h>
 
 #include "auvest/auvest.hpp"
+#include "explicit_scalar.hpp"
 
 namespace {
 
@@ -43,8 +42,8 @@ struct Tracker {
 
   static auvest::Vector<Scalar, 6> budgeted_ekf() {
     using Policy = auvest::CovarianceBudget<Scalar>;
-    return run(auvest::AdaptiveInterval<auvest::Ekf<Process>, Policy>(
-        auvest::Ekf<Process>(Process())));
+    return run(
+        auvest::AdaptiveInterval<auvest::Ekf<Process>, Policy>(auvest::Ekf<Process>(Process())));
   }
 };
 

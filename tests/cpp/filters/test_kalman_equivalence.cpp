@@ -114,8 +114,8 @@ TEST_CASE("linear model: EKF, UKF and Kalman filter agree to 1e-10") {
 }
 
 TEST_CASE("linear model: the generic path is the Kalman filter too") {
-  check_equals_kalman(auvest::Ekf<OpaqueProcess>(OpaqueProcess(process())),
-                      OpaqueSensor(sensor()), 1e-10);
+  check_equals_kalman(auvest::Ekf<OpaqueProcess>(OpaqueProcess(process())), OpaqueSensor(sensor()),
+                      1e-10);
   check_equals_kalman(auvest::Ukf<OpaqueProcess>(OpaqueProcess(process()), sigma(1, -1)),
                       OpaqueSensor(sensor()), 1e-10);
 }

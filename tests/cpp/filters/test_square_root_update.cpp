@@ -1,10 +1,9 @@
-#include "auvest/filters/square_root_update.hpp"
-
 #include <doctest/doctest.h>
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
+#include "auvest/filters/square_root_update.hpp"
 #include "auvest/math/random.hpp"
 
 namespace {
@@ -30,8 +29,7 @@ void check_against_textbook() {
   auvest::math::Random random(N * 100 + M * 10 + O);
   for (int trial = 0; trial < 50; ++trial) {
     const Matrix<double, N, N> root = random_matrix<double, N, N>(random, 1);
-    const Matrix<double, N, N> p =
-        root * root.transpose() + 0.1 * Matrix<double, N, N>::Identity();
+    const Matrix<double, N, N> p = root * root.transpose() + 0.1 * Matrix<double, N, N>::Identity();
     const Matrix<double, M, M> noise_root = random_matrix<double, M, M>(random, 0.3);
     const Matrix<double, M, M> noise =
         noise_root * noise_root.transpose() + 0.01 * Matrix<double, M, M>::Identity();
@@ -65,8 +63,9 @@ void check_against_textbook() {
       }
     }
     CHECK((correction.S - s).cwiseAbs().maxCoeff() < 1e-12 * s.trace());
-    CHECK(correction.nis == doctest::Approx(correction.innovation.dot(
-                                s.inverse() * correction.innovation)).epsilon(1e-9));
+    CHECK(correction.nis ==
+          doctest::Approx(correction.innovation.dot(s.inverse() * correction.innovation))
+              .epsilon(1e-9));
   }
 }
 

@@ -1,5 +1,3 @@
-#include "auvest/filters/ukf.hpp"
-
 #include <doctest/doctest.h>
 
 #include <Eigen/Eigenvalues>
@@ -8,6 +6,7 @@
 #include <limits>
 
 #include "auvest/filters/ekf.hpp"
+#include "auvest/filters/ukf.hpp"
 #include "auvest/math/random.hpp"
 #include "auvest/models/constant_acceleration.hpp"
 #include "auvest/models/range_bearing.hpp"
@@ -89,8 +88,8 @@ TEST_CASE("UKF: a refused call leaves the belief as it was") {
   CHECK(filter.update(Vector<double, 2>(1e308, 0), sonar).status == Status::kOverflow);
   auvest::RangeBearing<double, 6>::Params broken;
   broken.sigma_range_m = nan;
-  const auto refused = filter.update(Vector<double, 2>(10, 0.3),
-                                     auvest::RangeBearing<double, 6>(broken));
+  const auto refused =
+      filter.update(Vector<double, 2>(10, 0.3), auvest::RangeBearing<double, 6>(broken));
   CHECK(refused.status == Status::kNotPositiveDefinite);
   CHECK(refused.nis == 0);
   CHECK(same_belief(filter, before));

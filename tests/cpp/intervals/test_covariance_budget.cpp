@@ -1,10 +1,9 @@
-#include "auvest/intervals/covariance_budget.hpp"
-
 #include <doctest/doctest.h>
 
 #include <cmath>
 
 #include "auvest/filters/aukf.hpp"
+#include "auvest/intervals/covariance_budget.hpp"
 #include "auvest/intervals/fixed_interval.hpp"
 #include "auvest/models/constant_acceleration.hpp"
 

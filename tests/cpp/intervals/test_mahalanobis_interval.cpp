@@ -1,10 +1,9 @@
-#include "auvest/intervals/mahalanobis_interval.hpp"
-
 #include <doctest/doctest.h>
 
 #include <Eigen/LU>
 #include <cmath>
 
+#include "auvest/intervals/mahalanobis_interval.hpp"
 #include "auvest/math/random.hpp"
 
 namespace {
@@ -39,7 +38,7 @@ TEST_CASE("Eqs. (9) to (11): against Eigen on random points") {
     const Position v = p[2] - mean;
     const double expected = v.dot(s.inverse() * v);
     CHECK(squared_distance(p[0], p[1], p[2], p[3]) == doctest::Approx(expected).epsilon(1e-9));
-    CHECK(squared_distance(p[0], p[1], p[2], p[3]) < 2.25);  // (N - 1)^2 / N for N = 4
+    CHECK(squared_distance(p[0], p[1], p[2], p[3]) < 2.25 + 1e-12);  // (N - 1)^2 / N for N = 4
   }
 }
 
@@ -51,6 +50,17 @@ TEST_CASE("finding 4: a constant error gives d^2 = 1.5, whatever its size") {
     // At 1000 km the ridge, 2e-16 of the trace, begins to be felt in the narrow direction.
     CHECK(squared_distance(r0 + offset, r0, r1 + offset, r1) ==
           doctest::Approx(1.5).epsilon(e == 1e6 ? 0.02 : 1e-4));
+  }
+}
+
+TEST_CASE("d^2 sees the growth of an error, not its size") {
+  // Errors e and g e across a straight track: d^2 = 3/4 + 3/2 g^2 / (1 + g^2).
+  for (const double e : {1e-3, 1.0, 1e3}) {
+    for (const double g : {-1.0, 0.0, 0.5, 1.0, 2.0, 10.0}) {
+      CHECK(squared_distance(Position(0, e), Position(0, 0), Position(0.3, g * e),
+                             Position(0.3, 0)) ==
+            doctest::Approx(0.75 + 1.5 * g * g / (1 + g * g)).epsilon(1e-6));
+    }
   }
 }
 
@@ -134,8 +144,8 @@ TEST_CASE("bad parameters are reported") {
   CHECK(changed(&P::tau0, 0) == Status::kBadParameter);
   CHECK(changed(&P::tau0, 1) == Status::kBadParameter);
   CHECK(changed(&P::min_s, 0) == Status::kBadParameter);
-  CHECK(changed(&P::min_s, 0.6) == Status::kBadParameter);   // above T(0)
-  CHECK(changed(&P::max_s, 0.4) == Status::kBadParameter);   // below T(0)
+  CHECK(changed(&P::min_s, 0.6) == Status::kBadParameter);  // above T(0)
+  CHECK(changed(&P::max_s, 0.4) == Status::kBadParameter);  // below T(0)
   CHECK(changed(&P::max_s, std::nan("")) == Status::kBadParameter);
   CHECK(changed(&P::gamma1_m2, 0) == Status::kBadParameter);
   CHECK(changed(&P::gamma2, -1) == Status::kBadParameter);

@@ -33,6 +33,13 @@ double incongruence_ulp(float a, float wrapped) {
 
 bool inside(float a) { return a > -kPi && a <= kPi; }
 
+TEST_CASE("wrap: the first double above pi comes to lie on pi, not on -pi") {
+  // It is congruent to -3.14159265358979303, whose nearest double is -pi: the open end.
+  const double above = std::nextafter(auvest::math::pi<double>(), 4.0);
+  CHECK(auvest::math::wrap(above) == auvest::math::pi<double>());
+  CHECK(auvest::math::wrap(-above) == auvest::math::pi<double>());
+}
+
 }  // namespace
 
 TEST_CASE("wrap (float): inside (-pi, pi] nothing changes, bit for bit") {

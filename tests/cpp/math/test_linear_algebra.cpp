@@ -1,9 +1,8 @@
-#include "auvest/math/linear_algebra.hpp"
-
 #include <doctest/doctest.h>
 
 #include <Eigen/Cholesky>
 
+#include "auvest/math/linear_algebra.hpp"
 #include "auvest/math/random.hpp"
 
 namespace {
@@ -70,6 +69,28 @@ TEST_CASE("partial Cholesky: a lost pivot is floored, a bad diagonal refused") {
     q << 1, 0, 0, bad;
     CHECK_FALSE(auvest::math::partial_cholesky<2>(q));
   }
+}
+
+TEST_CASE("LDL': gives the matrix back, floors and refuses as the Cholesky factor does") {
+  auvest::math::Random random(4);
+  const auto p = random_covariance<double, 5>(random);
+  Matrix<double, 5, 5> a = p;
+  REQUIRE(auvest::math::ldlt(a));
+  for (int i = 0; i < 5; ++i) {
+    for (int j = 0; j <= i; ++j) {
+      double sum = 0;
+      for (int k = 0; k <= j; ++k) {
+        sum += (i == k ? 1 : a(i, k)) * a(k, k) * (j == k ? 1 : a(j, k));
+      }
+      CHECK(std::fabs(sum - p(i, j)) < 8e-16 * p.trace());
+    }
+  }
+  Matrix<float, 2, 2> singular;
+  singular << 1, 1, 1, 1;
+  REQUIRE(auvest::math::ldlt(singular));
+  CHECK(singular(1, 1) == 4 * std::numeric_limits<float>::epsilon());
+  singular(1, 1) = -1;
+  CHECK_FALSE(auvest::math::ldlt(singular));
 }
 
 TEST_CASE("positive definite: against the smallest eigenvalue's sign") {

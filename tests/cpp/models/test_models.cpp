@@ -168,8 +168,8 @@ TEST_CASE("measurement models") {
   check_measurement(sonar(), 100);
   Matrix<double, 2, 3> h;
   h << 1, -1, 0.5, 0, 2, 1;
-  check_measurement(
-      auvest::LinearMeasurement<double, 5, 2, 3>(h, Matrix<double, 2, 2>::Identity()), 10);
+  check_measurement(auvest::LinearMeasurement<double, 5, 2, 3>(h, Matrix<double, 2, 2>::Identity()),
+                    10);
 }
 
 TEST_CASE("noiseless convergence, also across the bearing's cut") {
@@ -197,7 +197,8 @@ TEST_CASE("constant acceleration: Eq. (4) has no dt^2/2 term, the exact model ha
 }
 
 TEST_CASE("constant acceleration: exact steps compose, Euler steps do not") {
-  // Two exact steps of 1 s are one of 2 s, in the mean, in Phi P Phi' and in Q (Chapman-Kolmogorov).
+  // Two exact steps of 1 s are one of 2 s, in the mean, in Phi P Phi' and in Q
+  // (Chapman-Kolmogorov).
   const auvest::ExactAcceleration<double> model;
   Belief<double, 6> twice;
   twice.x << 1, 2, 3, 4, 5, 6;
@@ -296,9 +297,9 @@ TEST_CASE("range and bearing: the near field begins where the belief reaches the
   belief.P.setIdentity();
   const Vector<double, 2> z(1.1, 0.4);
   View view = empty_view();
-  belief.P(0, 0) = belief.P(1, 1) = 0.99 / 18;  // sqrt(P_xx + P_yy) = 0.9949 / 3
+  belief.P(0, 0) = belief.P(1, 1) = 0.99 / 50;  // sqrt(P_xx + P_yy) = 0.9949 m / 5
   CHECK_FALSE(model.near_field(belief, z, view));
-  belief.P(0, 0) = belief.P(1, 1) = 1.01 / 18;
+  belief.P(0, 0) = belief.P(1, 1) = 1.01 / 50;
   REQUIRE(model.near_field(belief, z, view));
   // The measured position minus the believed one.
   CHECK(view.innovation(0) == doctest::Approx(1.1 * std::cos(0.4) - 1));
@@ -332,10 +333,8 @@ TEST_CASE("range and bearing: covariance of the position form, by Monte Carlo") 
     const double v = -s * view.innovation(0) + c * view.innovation(1);
     along += u * u;
     across += v * v;
-    predicted_along +=
-        c * c * view.R(0, 0) + 2 * c * s * view.R(1, 0) + s * s * view.R(1, 1);
-    predicted_across +=
-        s * s * view.R(0, 0) - 2 * c * s * view.R(1, 0) + c * c * view.R(1, 1);
+    predicted_along += c * c * view.R(0, 0) + 2 * c * s * view.R(1, 0) + s * s * view.R(1, 1);
+    predicted_across += s * s * view.R(0, 0) - 2 * c * s * view.R(1, 0) + c * c * view.R(1, 1);
   }
   // Terms of the order sigma_b^4 r^2 are dropped from `across` (sin^2 against angle^2: 4 %) and
   // E[r_measured^2] = r^2 + sigma_r^2 counts sigma_r^2 twice there (2 %).

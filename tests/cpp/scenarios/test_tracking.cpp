@@ -1,5 +1,3 @@
-#include "auvest/scenarios/tracking.hpp"
-
 #include <doctest/doctest.h>
 
 #include <cmath>
@@ -9,6 +7,7 @@
 #include "auvest/intervals/fixed_interval.hpp"
 #include "auvest/models/constant_acceleration.hpp"
 #include "auvest/models/range_bearing.hpp"
+#include "auvest/scenarios/tracking.hpp"
 
 namespace {
 
@@ -75,8 +74,8 @@ TEST_CASE("noise: mean and standard deviation of the three kinds") {
       const double expected = scale * SensorNoise::standard_deviation(kind);
       // Four standard errors of the mean; 5 % for the lognormal's heavy-tailed variance, 1 % else.
       CHECK(std::fabs(mean - scale * SensorNoise::mean(kind)) < 4 * expected / std::sqrt(1.0 * n));
-      CHECK(sigma == doctest::Approx(expected).epsilon(
-                         kind == SensorNoise::Kind::kLognormal ? 0.05 : 0.01));
+      CHECK(sigma ==
+            doctest::Approx(expected).epsilon(kind == SensorNoise::Kind::kLognormal ? 0.05 : 0.01));
     }
   }
 }
@@ -122,8 +121,8 @@ TEST_CASE("loop: the duration ends it, probes stand at even times, dropouts are 
   timed.probe.period_s = 0.125;
   timed.probe.budget_m = 1e-12;
   timed.run(1, 1000, 10.2);
-  CHECK(timed.x.size() == 20);         // 0.5 s each
-  CHECK(timed.probe.count == 79);      // 1/8, 2/8, ... 79/8 s; at 10 s the loop has ended
+  CHECK(timed.x.size() == 20);     // 0.5 s each
+  CHECK(timed.probe.count == 79);  // 1/8, 2/8, ... 79/8 s; at 10 s the loop has ended
   CHECK(timed.probe.above == timed.probe.count);
 
   Loop silent;

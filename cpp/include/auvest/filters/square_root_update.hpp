@@ -7,14 +7,14 @@
 //     innovation = A' y + e,   y ~ N(0, I),   e ~ N(0, E),   so that S = A' A + E.
 //
 // The EKF has A = (H L)' and E = R; the UKF has the t_i of its sigma points in the rows of A and
-// the rest of P_yy in E (sigma_points.hpp). The update whitens E, then takes one scalar measurement
-// after the other with Potter's square-root formula
+// the rest of P_yy in E (sigma_points.hpp). The update decorrelates E = U D U', then takes one
+// scalar measurement of variance d after the other with Potter's square-root formula
 //
-//     G <- G (I - gamma f f'),  f = G' a,  alpha = 1 / (1 + f'f),  gamma = alpha / (1 + sqrt alpha)
+//     G <- G (I - gamma f f'),  f = G' a,  s = f'f + d,  gamma = 1 / (s + sqrt(d s))
 //
 // and forms P = (L G)(L G)' + [0 0; 0 Schur]. That equals P - K S K', but a square cannot turn
 // negative: no Joseph form is needed, and 32 bits serve where P - K S K' needs 64. The NIS comes
-// out as a sum of squares, sum r^2 alpha, which equals innovation' S^-1 innovation.
+// out as a sum of squares, sum r^2 / s, which equals innovation' S^-1 innovation.
 #pragma once
 
 #include "auvest/math/linear_algebra.hpp"
@@ -60,47 +60,43 @@ inline Status square_root_update(Belief<Scalar, N>& belief, const Matrix<Scalar,
       correction.S(j, i) = sum;
     }
   }
-  if (!math::partial_cholesky<M>(noise)) return Status::kNotPositiveDefinite;
+  if (!math::ldlt(noise)) return Status::kNotPositiveDefinite;
 
-  // Potter, one whitened measurement after the other; y and G live in the coordinates of L.
+  // Potter, one decorrelated measurement after the other; y and G live in the coordinates of L.
   Vector<Scalar, O> y;
   Matrix<Scalar, O, O> g;
-  Matrix<Scalar, O, M> white;
-  Vector<Scalar, M> residual;
+  Matrix<Scalar, O, M> b;      // columns: A decorrelated
+  Vector<Scalar, M> residual;  // the innovation decorrelated
   correction.nis = Scalar(0);
   AUVEST_UNROLL
   for (int m = 0; m < M; ++m) {
-    const Scalar inverse = Scalar(1) / noise(m, m);
-    Scalar r = correction.innovation(m);
+    residual(m) = correction.innovation(m);
     AUVEST_UNROLL
-    for (int l = 0; l < m; ++l) r = r - noise(m, l) * residual(l);
-    residual(m) = r * inverse;
+    for (int l = 0; l < m; ++l) residual(m) = residual(m) - noise(m, l) * residual(l);
     AUVEST_UNROLL
     for (int k = 0; k < O; ++k) {
-      Scalar value = a(k, m);
+      b(k, m) = a(k, m);
       AUVEST_UNROLL
-      for (int l = 0; l < m; ++l) value = value - noise(m, l) * white(k, l);
-      white(k, m) = value * inverse;
+      for (int l = 0; l < m; ++l) b(k, m) = b(k, m) - noise(m, l) * b(k, l);
     }
 
-    Vector<Scalar, O> f;  // G' a
+    Vector<Scalar, O> f;  // G' b
     Vector<Scalar, O> v;  // G f
     Scalar surprise = residual(m);
-    Scalar spread = Scalar(1);
+    Scalar spread = noise(m, m);
     AUVEST_UNROLL
     for (int k = 0; k < O; ++k) {
-      f(k) = white(k, m);
+      f(k) = b(k, m);
       if (m > 0) {
-        f(k) = g(0, k) * white(0, m);
+        f(k) = g(0, k) * b(0, m);
         AUVEST_UNROLL
-        for (int l = 1; l < O; ++l) f(k) = f(k) + g(l, k) * white(l, m);
-        surprise = surprise - white(k, m) * y(k);
+        for (int l = 1; l < O; ++l) f(k) = f(k) + g(l, k) * b(l, m);
+        surprise = surprise - b(k, m) * y(k);
       }
       spread = spread + f(k) * f(k);
     }
-    const Scalar alpha = Scalar(1) / spread;
-    const Scalar gamma = alpha / (Scalar(1) + sqrt(alpha));
-    const Scalar step = alpha * surprise;
+    const Scalar gamma = Scalar(1) / (spread + sqrt(noise(m, m) * spread));
+    const Scalar step = surprise / spread;
     correction.nis = correction.nis + step * surprise;
     AUVEST_UNROLL
     for (int k = 0; k < O; ++k) {

@@ -134,9 +134,9 @@ struct MahalanobisInterval {
   ///     d^2 = v' S^-1 v = 3 sum_i (v x v_i)^2 / sum_(i<j) (v_i x v_j)^2,
   ///
   /// sums of squares, in which nothing cancels. S is singular when the points are collinear, as at
-  /// the start, where X(0) = R(0), and on noise-free straight legs: epsilon times its trace is added
-  /// to its diagonal, which gives the pseudo-inverse's distance along the line there and changes
-  /// nothing elsewhere. If all four points coincide, d^2 = 0.
+  /// the start, where X(0) = R(0), and on noise-free straight legs: epsilon times its trace is
+  /// added to its diagonal, which gives the pseudo-inverse's distance along the line there and
+  /// changes nothing elsewhere. If all four points coincide, d^2 = 0.
   Scalar squared_distance(const Position& estimate, const Position& reference) const {
     const Position* points[4] = {&estimate, &reference, &memory.last_estimate,
                                  &memory.last_reference};  // Eq. (9)
@@ -146,7 +146,7 @@ struct MahalanobisInterval {
       const Scalar mean = Scalar(0.25) * (((*points[0])(axis) + (*points[1])(axis)) +
                                           ((*points[2])(axis) + (*points[3])(axis)));  // Eq. (10)
       for (int i = 0; i < 4; ++i) {
-        v[i][axis] = (*points[i])(axis) - mean;
+        v[i][axis] = (*points[i])(axis)-mean;
         trace = trace + v[i][axis] * v[i][axis];
       }
     }

@@ -40,9 +40,13 @@ struct DoubleWrap {
     if (size <= 9.424777960769379) {  // 3 pi, rounded down
       if (size == pi<double>()) return size;
       const double wrapped = (size - 6.28318530717958623) - 2.44929359829470641e-16;
-      return a < 0.0 ? -wrapped : wrapped;
+      return closed_above(a < 0.0 ? -wrapped : wrapped);
     }
-    const double wrapped = std::atan2(std::sin(a), std::cos(a));
+    return closed_above(std::atan2(std::sin(a), std::cos(a)));
+  }
+
+ private:
+  static double closed_above(double wrapped) {
     return wrapped == -pi<double>() ? pi<double>() : wrapped;
   }
 };

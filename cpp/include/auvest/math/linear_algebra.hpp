@@ -71,6 +71,34 @@ inline bool partial_cholesky(Matrix<Scalar, N, N>& a) {
   return true;
 }
 
+/// a = L D L' with a unit lower triangular L, in place: D on the diagonal, L below it. Pivots are
+/// floored as in partial_cholesky. False, with `a` left unusable, if a diagonal element is not
+/// positive (or is NaN).
+template <class Scalar, int N>
+inline bool ldlt(Matrix<Scalar, N, N>& a) {
+  const Scalar pivot_floor = Scalar(4) * machine_epsilon<Scalar>();
+  Vector<Scalar, N> floor;
+  AUVEST_UNROLL
+  for (int i = 0; i < N; ++i) {
+    if (!(a(i, i) > Scalar(0))) return false;
+    floor(i) = pivot_floor * a(i, i);
+  }
+  AUVEST_UNROLL
+  for (int k = 0; k < N; ++k) {
+    if (a(k, k) < floor(k)) a(k, k) = floor(k);
+    if (k + 1 == N) break;
+    const Scalar inverse = Scalar(1) / a(k, k);
+    AUVEST_UNROLL
+    for (int i = N - 1; i > k; --i) {  // upwards: row i needs the unscaled column above it
+      const Scalar l = a(i, k) * inverse;
+      AUVEST_UNROLL
+      for (int j = k + 1; j <= i; ++j) a(i, j) = a(i, j) - l * a(j, k);
+      a(i, k) = l;
+    }
+  }
+  return true;
+}
+
 /// True if the symmetric matrix (lower triangle) is positive definite to working precision: no
 /// pivot of its Cholesky factorisation is lost in rounding noise.
 template <class Scalar, int N>

@@ -46,9 +46,9 @@ struct RangeBearing : MeasurementModel<RangeBearing<Scalar_, N>, Scalar_, N, 2, 
     Scalar station_y_m = Scalar(2);           ///< b_y, Table 1
     Scalar sigma_range_m = Scalar(0.05);      ///< standard deviation of v_r (not in the paper)
     Scalar sigma_bearing_rad = Scalar(0.01);  ///< standard deviation of v_b (not in the paper)
-    /// Position form below this many standard deviations sqrt(P_xx + P_yy) of range; 0: never, but
-    /// for ranges below 1e-15 m.
-    Scalar near_field = Scalar(3);
+    /// Position form below this many standard deviations sqrt(P_xx + P_yy) of range: enough that
+    /// the estimate is never on the wrong side of the station. 0: only below 1e-15 m.
+    Scalar near_field = Scalar(5);
   };
 
   Params params;
@@ -86,8 +86,10 @@ struct RangeBearing : MeasurementModel<RangeBearing<Scalar_, N>, Scalar_, N, 2, 
       const Scalar a_minus = sqrt((one - p) * (one - p) + qq);
       const Scalar a_sum = a_plus + a_minus;
       const Scalar a_product = a_plus * a_minus;
-      const Scalar g = w > Scalar(0) ? Scalar(4) * qq / (a_product + w) : a_product - w;
-      sum(0) = two * range * g / (a_sum + two);
+      const bool inside = w > Scalar(0);
+      const Scalar numerator = inside ? Scalar(4) * qq : a_product - w;
+      const Scalar denominator = inside ? (a_product + w) * (a_sum + two) : a_sum + two;
+      sum(0) = two * range * numerator / denominator;  // 2 |D| g / (a+ + a- + 2)
       difference(0) = Scalar(4) * range * p / a_sum;
       sum(1) = atan2(-(two * p * q), (one - pp) + qq);
       difference(1) = atan2(two * q, w);

@@ -31,6 +31,19 @@ struct Track {
   double velocity[2] = {0.1, 0.2};        ///< [m/s], norm 0.224 of Table 1
   double acceleration[2] = {0.01, 0.02};  ///< [m/s^2], norm 0.0224 of Table 1
   double turn_rate = 0;                   ///< [rad/s], kTurn only
+  /// The vehicle circles around the desired track by this much, as a real one that is steered onto
+  /// it; 0: the desired track is the true one, as in the paper's simulation.
+  double wander_m = 0;
+  double wander_period_s = 60;
+
+  /// The desired position [m] at a time.
+  void desired(double time_s, double (&reference)[2]) const {
+    double s = 0;
+    double c = 0;
+    math::sincos(math::two_pi<double>() * (time_s / wander_period_s), s, c);
+    reference[0] = position[0] + wander_m * (c - 1);
+    reference[1] = position[1] + wander_m * s;
+  }
 
   void advance(double dt) {
     if (kind == Kind::kTurn) {
@@ -122,8 +135,7 @@ struct TrackingProbe {
 };
 
 /// Runs the loop for at most `steps` samples and `duration_s` seconds and hands every step to
-/// `sink(step)`. The desired track is the true track, as in the paper. Stops at the first status
-/// that is not kOk and returns it.
+/// `sink(step)`. Stops at the first status that is not kOk and returns it.
 template <class Filter, class Model, class Sink>
 inline Status track(Filter& filter, const Model& model, Track truth, const SensorNoise& noise,
                     math::Random& random, std::uint32_t steps, double duration_s,
@@ -175,9 +187,11 @@ inline Status track(Filter& filter, const Model& model, Track truth, const Senso
       correction = filter.update(measurement, model);
       if (correction.status != Status::kOk) return correction.status;
     }
+    double desired[2];
+    truth.desired(time, desired);
     Position reference;
-    reference(0) = static_cast<Scalar>(truth.position[0]);
-    reference(1) = static_cast<Scalar>(truth.position[1]);
+    reference(0) = static_cast<Scalar>(desired[0]);
+    reference(1) = static_cast<Scalar>(desired[1]);
     status = filter.feedback(reference);
     if (status != Status::kOk) return status;
     sink(TrackingStep<Filter, Model::kSize>{time, dt, truth, z, filter, correction});
