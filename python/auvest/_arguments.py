@@ -1,0 +1,211 @@
+"""Checks of arguments: each names the argument, what was given and what was expected.
+
+The module ``auvest._core`` takes only arrays of the exact dtype; here is where everything else is
+converted or refused.
+"""
+
+from __future__ import annotations
+
+import math
+import numbers
+import threading
+from collections.abc import Mapping
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+Floats: TypeAlias = npt.NDArray[np.floating[Any]]
+DType: TypeAlias = np.dtype[np.float32] | np.dtype[np.float64]
+
+#: Rows that one call takes at most; a filter goes on where it stopped, so records can be split.
+MAX_ROWS = 10_000_000
+
+
+def as_dtype(value: object) -> DType:
+    """Take float32 or float64, from a name, a NumPy type or a NumPy dtype."""
+    try:
+        # None is NumPy's word for float64, and equal to it.
+        dtype = None if value is None else np.dtype(value)  # type: ignore[call-overload]
+    except TypeError:
+        dtype = None
+    if dtype is not None and dtype == np.dtype(np.float32):
+        return np.dtype(np.float32)
+    if dtype is not None and dtype == np.dtype(np.float64):
+        return np.dtype(np.float64)
+    raise ValueError(f"dtype must be 'float32' or 'float64', not {value!r}")
+
+
+def as_kind(name: str, value: object, kinds: tuple[str, ...]) -> str:
+    """Take one of a few names."""
+    if not isinstance(value, str):
+        raise TypeError(f"{name} must be a str, not {type(value).__name__}")
+    if value not in kinds:
+        *first, last = (repr(kind) for kind in kinds)
+        raise ValueError(f"{name} must be {', '.join(first)} or {last}, not {value!r}")
+    return value
+
+
+def as_flag(name: str, value: object) -> bool:
+    if not isinstance(value, (bool, np.bool_)):
+        raise TypeError(f"{name} must be True or False, not {value!r}")
+    return bool(value)
+
+
+def as_instance(name: str, value: object, expected: type | tuple[type, ...]) -> Any:
+    if not isinstance(value, expected):
+        types = expected if isinstance(expected, tuple) else (expected,)
+        names = " or ".join(f"auvest.{t.__name__}" for t in types)
+        raise TypeError(f"{name} must be an {names}, not {type(value).__name__}")
+    return value
+
+
+def as_integer(name: str, value: object, low: int, high: int) -> int:
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, numbers.Integral):
+        raise TypeError(f"{name} must be an integer, not {type(value).__name__}")
+    number = int(value)
+    if not low <= number <= high:
+        raise ValueError(f"{name} must lie in {low}..{high}, not {number}")
+    return number
+
+
+Bound: TypeAlias = Literal["any", "positive", "not negative"]
+
+
+def as_number(name: str, value: object, bound: Bound = "any", *, infinite: bool = False) -> float:
+    """Take a finite real number; ``infinite`` also allows +inf."""
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value[()]
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, numbers.Real):
+        hint = f" of shape {value.shape}" if isinstance(value, np.ndarray) else ""
+        raise TypeError(f"{name} must be a number, not {type(value).__name__}{hint}")
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number) and not (infinite and number == math.inf):
+        raise ValueError(f"{name} must be finite, not {value}")
+    if bound == "positive" and number <= 0:
+        raise ValueError(f"{name} must be positive, not {number}")
+    if bound == "not negative" and number < 0:
+        raise ValueError(f"{name} must not be negative, not {number}")
+    return number
+
+
+def require_range(
+    params: Mapping[str, float], dtype: str, *, squared: tuple[str, ...] = ()
+) -> None:
+    """Refuse parameters, or the squares of those in ``squared``, that ``dtype`` cannot hold."""
+    limits = np.finfo(dtype)
+    for name, value in params.items():
+        size = abs(value) * abs(value) if name in squared else abs(value)
+        if size > float(limits.max) or (value != 0 and size < float(limits.tiny)):
+            what = f"the square of {name}" if name in squared else name
+            raise ValueError(f"{name} = {value} does not suit {dtype}: {what} leaves its range")
+
+
+def as_pair(name: str, value: object) -> tuple[float, float]:
+    """Take two finite numbers, for example a position."""
+    array = as_array(name, value, (2,), np.dtype(np.float64))
+    return float(array[0]), float(array[1])
+
+
+def as_array(
+    name: str,
+    value: object,
+    shape: tuple[int | None, ...],
+    dtype: DType,
+    *,
+    missing: bool = False,
+) -> Floats:
+    """Make a C-contiguous array of ``dtype`` whose elements are finite.
+
+    ``None`` in ``shape`` stands for any number of rows, at least one. Integers and other floats
+    are converted; ``missing`` lets rows pass that are NaN throughout.
+    """
+    raw = _as_real(name, value, shape)
+    _check_shape(name, raw, shape)
+    with np.errstate(over="ignore"):
+        array: Floats = np.ascontiguousarray(raw, dtype=dtype)
+    bad = ~np.isfinite(array)
+    if missing and bad.any():
+        bad &= ~np.isnan(array).all(axis=-1, keepdims=True)
+    if bad.any():
+        index = tuple(int(i) for i in np.argwhere(bad)[0])
+        _refuse_element(name, raw, index, dtype, missing)
+    return array
+
+
+def _refuse_element(
+    name: str, raw: npt.NDArray[Any], index: tuple[int, ...], dtype: DType, missing: bool
+) -> None:
+    element = raw[index]
+    where = f"{name}[{', '.join(str(i) for i in index)}]"
+    if np.isfinite(element):
+        largest = float(np.finfo(dtype).max)
+        raise ValueError(
+            f"{where} is {element}: beyond the range of {dtype.name}, which ends at {largest:.3g}"
+        )
+    if missing and np.isnan(element):
+        raise ValueError(
+            f"{where} is nan and the rest of the measurement is not; "
+            "a missing measurement is NaN throughout"
+        )
+    raise ValueError(f"{where} is {element}; all elements must be finite")
+
+
+def _as_real(name: str, value: object, shape: tuple[int | None, ...]) -> npt.NDArray[Any]:
+    expected = f"an array of shape {_shape(shape)}"
+    if value is None:
+        raise TypeError(f"{name} must be {expected}, not None")
+    if isinstance(value, np.ma.MaskedArray):
+        raise TypeError(f"{name} must be {expected}, not a masked array; use z.filled(np.nan)")
+    try:
+        raw = np.asarray(value)
+    except ValueError:
+        raise ValueError(f"{name} must be {expected}, not rows of different lengths") from None
+    if raw.dtype.kind not in "fiu":
+        given = "str" if raw.dtype.kind in "US" else raw.dtype.name
+        raise TypeError(f"{name} must be {expected} of real numbers, not of {given}")
+    return raw
+
+
+def _check_shape(name: str, raw: npt.NDArray[Any], shape: tuple[int | None, ...]) -> None:
+    fits = raw.ndim == len(shape) and all(
+        want is None or have == want for have, want in zip(raw.shape, shape, strict=True)
+    )
+    if not fits:
+        hint = ""
+        if len(shape) == 1 and raw.ndim == 2 and 1 in raw.shape and raw.size == shape[0]:
+            hint = f"; row and column vectors are refused, use {name}.ravel()"
+        elif len(shape) == 2 and shape[0] is None and raw.shape == shape[1:]:
+            hint = f"; one row is {name}[np.newaxis]"
+        elif len(shape) == 2 and raw.shape == shape[::-1]:
+            hint = f"; transpose it: {name}.T"
+        raise ValueError(f"{name} has shape {raw.shape}, expected {_shape(shape)}{hint}")
+    if raw.size == 0:
+        raise ValueError(f"{name} is empty: shape {raw.shape}, expected at least one row")
+    if shape[0] is None and len(raw) > MAX_ROWS:
+        raise ValueError(
+            f"{name} has {len(raw)} rows, at most {MAX_ROWS} are taken at once; split the record: "
+            "a filter goes on where it stopped"
+        )
+
+
+def _shape(shape: tuple[int | None, ...]) -> str:
+    symbols = ["T" if extent is None else str(extent) for extent in shape]
+    return f"({symbols[0]},)" if len(symbols) == 1 else f"({', '.join(symbols)})"
+
+
+class Exclusive:
+    """Refuses the second thread that enters while the first is inside."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+
+    def __enter__(self) -> None:
+        if not self._lock.acquire(blocking=False):
+            raise RuntimeError("this filter is in use by another thread; use one per thread")
+
+    def __exit__(self, *_: object) -> None:
+        self._lock.release()

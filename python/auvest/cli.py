@@ -1,0 +1,72 @@
+"""The command line ``auvest``: the tree of commands. Each command is a module of its own.
+
+To add one: write ``commands/<verb>_<noun>.py`` with a function ``command`` and its ``HELP``, and
+register it below.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from auvest.commands import reproduce_aukf, reproduce_intervals, simulate_aukf
+from auvest.commands.console import EXIT_CODES
+from auvest.commands.version import version
+
+_CONTEXT = {"help_option_names": ["-h", "--help"]}
+
+app = typer.Typer(
+    name="auvest",
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    pretty_exceptions_show_locals=False,
+    context_settings=_CONTEXT,
+    help=f"""Estimators for small autonomous underwater vehicles: simulate, reproduce, compare.
+
+Results go to stdout, messages and progress to stderr; --json gives one JSON object on stdout.
+
+First steps:
+
+  auvest simulate aukf               the paper's scenario, a table and a figure
+
+  auvest simulate aukf --help        all its options, with examples
+
+  auvest reproduce aukf              every figure and claim of the paper beside ours
+
+  auvest reproduce intervals         the interval policies at equal sampling rate
+
+{EXIT_CODES}
+""",
+)
+
+simulate = typer.Typer(
+    no_args_is_help=True, help="Simulate a filter in its scenario, many runs.", name="simulate"
+)
+reproduce = typer.Typer(
+    no_args_is_help=True, help="Reproduce a paper's figures and judge its claims.", name="reproduce"
+)
+app.add_typer(simulate)
+app.add_typer(reproduce)
+
+simulate.command("aukf", help=simulate_aukf.HELP)(simulate_aukf.command)
+reproduce.command("aukf", help=reproduce_aukf.HELP)(reproduce_aukf.command)
+reproduce.command("intervals", help=reproduce_intervals.HELP)(reproduce_intervals.command)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"auvest {version()}")
+        raise typer.Exit
+
+
+@app.callback()
+def _main(
+    show_version: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=_show_version, is_eager=True, help="Show the version and stop."
+        ),
+    ] = False,
+) -> None:
+    pass

@@ -1,0 +1,1 @@
+"""The commands of ``auvest``, one module each; :mod:`auvest.cli` hangs them into one tree."""

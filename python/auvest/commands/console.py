@@ -1,0 +1,192 @@
+"""What all commands share: where output goes, exit codes, progress, checks of option values.
+
+Results go to stdout, everything else to stderr. With ``--json`` stdout holds one JSON object and
+nothing else. ``--quiet`` leaves only errors on stderr.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from enum import IntEnum
+from pathlib import Path
+from typing import Annotated, Any, NoReturn
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+#: ``progress(done, total)``, called now and then by long work.
+ProgressCallback = Callable[[int, int], None]
+
+
+class ExitCode(IntEnum):
+    """What the shell sees."""
+
+    OK = 0
+    FAILED = 1
+    USAGE = 2
+    INTERRUPTED = 130
+
+
+EXIT_CODES = (
+    "Exit codes: 0 done; 1 a run failed or a file could not be written; 2 wrong usage; "
+    "130 interrupted (what was done is kept)."
+)
+
+
+class Terminal:
+    """Where a command writes: ``result`` to stdout, ``say`` and progress to stderr."""
+
+    def __init__(self, *, as_json: bool, quiet: bool) -> None:
+        self.as_json = as_json
+        self._out = Console(highlight=False, soft_wrap=True)
+        self._err = Console(stderr=True, highlight=False, soft_wrap=True)
+        self._messages = Console(stderr=True, highlight=False, soft_wrap=True, quiet=quiet)
+
+    def result(self, renderable: Any) -> None:
+        """Print a result for a human; with ``--json`` nothing."""
+        if not self.as_json:
+            self._out.print(renderable)
+
+    def result_json(self, value: dict[str, Any]) -> None:
+        """Print the one JSON object, if it was asked for."""
+        if self.as_json:
+            typer.echo(to_json(value))
+
+    def say(self, message: str) -> None:
+        """Print a message that may be left out."""
+        self._messages.print(escape(message))
+
+    def fail(self, message: str, code: ExitCode) -> NoReturn:
+        """Print one line on stderr and end."""
+        self._err.print(f"[bold red]Error:[/] {escape(message)}")
+        raise typer.Exit(int(code))
+
+    @contextmanager
+    def progress(self, what: str) -> Iterator[ProgressCallback]:
+        """Show a bar on stderr that is gone when the work is done, if it is a terminal."""
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeRemainingColumn(),
+        )
+        hidden = self._messages.quiet or not self._messages.is_terminal
+        with Progress(*columns, console=self._messages, transient=True, disable=hidden) as bar:
+            task = bar.add_task(what, total=None)
+            yield lambda done, total: bar.update(task, completed=done, total=total)
+
+    @contextmanager
+    def usage_errors(self) -> Iterator[None]:
+        """Turn the library's own checks of arguments into one line, exit code 2."""
+        try:
+            yield
+        except (ValueError, TypeError) as error:
+            self.fail(str(error), ExitCode.USAGE)
+
+    def make_folder(self, folder: Path) -> None:
+        """Create the output folder before the work, so that a wrong one is known at once."""
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            probe = folder / ".auvest-write-test"
+            probe.touch()
+            probe.unlink()
+        except OSError as error:
+            self.fail(
+                f"--output {folder}: cannot write there: {error.strerror or error}",
+                ExitCode.FAILED,
+            )
+
+    @contextmanager
+    def writing(self, folder: Path) -> Iterator[None]:
+        """Turn a full disk and the like into one line, exit code 1."""
+        try:
+            yield
+        except OSError as error:
+            self.fail(f"cannot write to {folder}: {error.strerror or error}", ExitCode.FAILED)
+
+
+def to_json(value: Any) -> str:
+    """JSON with NaN and infinity as null, and keys in their own order."""
+    return json.dumps(_plain(value), indent=2, allow_nan=False)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if hasattr(value, "tolist"):
+        return _plain(value.tolist())
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def positive(value: float | None) -> float | None:
+    """Option callback: a finite number above zero."""
+    if value is not None and not (math.isfinite(value) and value > 0):
+        raise typer.BadParameter(f"{value} is not a finite number above 0.")
+    return value
+
+
+def not_negative(value: float | None) -> float | None:
+    """Option callback: a finite number, zero or above."""
+    if value is not None and not (math.isfinite(value) and value >= 0):
+        raise typer.BadParameter(f"{value} is not a finite number of at least 0.")
+    return value
+
+
+def finite(value: float | None) -> float | None:
+    """Option callback: any finite number."""
+    if value is not None and not math.isfinite(value):
+        raise typer.BadParameter(f"{value} is not a finite number.")
+    return value
+
+
+def fraction(value: float | None) -> float | None:
+    """Option callback: a probability below one."""
+    if value is not None and not 0 <= value < 1:
+        raise typer.BadParameter(f"{value} is not a probability of at least 0 and below 1.")
+    return value
+
+
+def open_unit(value: float | None) -> float | None:
+    """Option callback: strictly between zero and one."""
+    if value is not None and not 0 < value < 1:
+        raise typer.BadParameter(f"{value} is not strictly between 0 and 1.")
+    return value
+
+
+# Options that mean the same in every command.
+_OUTPUT = "Output"
+Runs = Annotated[
+    int, typer.Option("--runs", min=1, max=100_000, help="Monte Carlo runs.", show_default=True)
+]
+Seed = Annotated[
+    int,
+    typer.Option(
+        "--seed",
+        min=0,
+        max=2**64 - 1,
+        help="Seed: the same seed gives the same numbers, whatever the number of workers.",
+    ),
+]
+Workers = Annotated[
+    int | None,
+    typer.Option("--workers", min=1, max=256, help="Threads.", show_default="one per processor"),
+]
+Json = Annotated[
+    bool,
+    typer.Option(
+        "--json", help="One JSON object on stdout, nothing else.", rich_help_panel=_OUTPUT
+    ),
+]
+Quiet = Annotated[
+    bool,
+    typer.Option("--quiet", "-q", help="Only errors on stderr.", rich_help_panel=_OUTPUT),
+]

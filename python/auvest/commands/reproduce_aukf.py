@@ -1,0 +1,114 @@
+"""``auvest reproduce aukf``: the AUKF paper's figures and claims beside what we measure."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from auvest.commands import console
+from auvest.commands.console import EXIT_CODES, ExitCode, Terminal
+from auvest.commands.files import write_csv
+from auvest.commands.version import version
+from auvest.reproduce import aukf, aukf_page
+
+HELP = f"""Reproduce the AUKF paper (Deng, Yin, Duan 2019): Figs 1 to 10 and every claim.
+
+Writes each figure as PNG and CSV, a page README.md that sets the paper's figures and claims beside
+what was measured, with all assumptions and contradictions, and results.json.
+
+Examples:
+
+  auvest reproduce aukf
+
+  auvest reproduce aukf --runs 40 --output /tmp/aukf
+
+  auvest reproduce aukf --json --quiet | jq .figure3.interval_s
+
+{EXIT_CODES}
+"""
+
+
+def command(
+    runs: console.Runs = aukf.DEFAULT_RUNS,
+    seed: console.Seed = aukf.DEFAULT_SEED,
+    workers: console.Workers = None,
+    output: Annotated[
+        Path,
+        typer.Option(
+            file_okay=False, help="Folder for the page; made if missing.", rich_help_panel="Output"
+        ),
+    ] = Path("auvest-output/reproduce-aukf"),
+    as_json: console.Json = False,
+    quiet: console.Quiet = False,
+) -> None:
+    """Reproduce; the help text is :data:`HELP`."""
+    terminal = Terminal(as_json=as_json, quiet=quiet)
+    terminal.make_folder(output)
+    done: list[Path] = []
+    try:
+        with terminal.progress("experiments") as progress, terminal.usage_errors():
+            result = aukf.measure(runs=runs, seed=seed, workers=workers, progress=progress)
+        claims = aukf_page.claims(result)
+        document = {
+            "command": "reproduce aukf",
+            "version": version(),
+            **aukf.summary(result),
+            "claims": [claim.as_dict() for claim in claims],
+        }
+        with terminal.writing(output):
+            write_results(output, result, document, done)
+        with terminal.progress("figures") as progress, terminal.writing(output):
+            draw_figures(output, result, progress, done)
+    except KeyboardInterrupt:
+        terminal.fail(
+            f"interrupted: {len(done)} files are written to {output}", ExitCode.INTERRUPTED
+        )
+    terminal.result_json(document)
+    terminal.result(_table(claims))
+    terminal.result(f"page      {output / 'README.md'}")
+    terminal.result(f"figures   {output / 'fig01.png'} to fig10.png, numbers beside them as CSV")
+    terminal.result(f"results   {output / 'results.json'}")
+    if result.failed_runs:
+        terminal.fail(f"{result.failed_runs} runs failed; numbers are missing", ExitCode.FAILED)
+
+
+def write_results(
+    folder: Path, result: aukf.Reproduction, document: dict[str, object], done: list[Path]
+) -> None:
+    """Write results.json, the CSV files and the page; ``done`` gets each path when it is there."""
+    path = folder / "results.json"
+    path.write_text(console.to_json(document) + "\n", encoding="utf-8")
+    done.append(path)
+    for stem, table in aukf.tables(result).items():
+        done.append(write_csv(folder / f"{stem}.csv", table))
+    path = folder / "README.md"
+    path.write_text(aukf_page.page(result), encoding="utf-8")
+    done.append(path)
+
+
+def draw_figures(
+    folder: Path,
+    result: aukf.Reproduction,
+    progress: console.ProgressCallback,
+    done: list[Path],
+) -> None:
+    """Write the PNG files."""
+    from auvest import plots  # here, because matplotlib takes long to import
+    from auvest.reproduce import aukf_figures
+
+    total = len(aukf_figures.FIGURES)
+    for number, (stem, draw) in enumerate(aukf_figures.FIGURES.items(), start=1):
+        done.append(plots.save(draw(result), folder / f"{stem}.png"))
+        progress(number, total)
+
+
+def _table(claims: list[aukf_page.Claim]) -> Table:
+    table = Table(title="Claims of the paper", title_justify="left", title_style="bold")
+    for title in ("where", "the paper", "verdict"):
+        table.add_column(title)
+    for claim in claims:
+        table.add_row(claim.where, claim.paper, claim.verdict)
+    return table

@@ -1,0 +1,489 @@
+"""``auvest simulate aukf``: the paper's scenario with any filter, interval policy and noise."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+import typer
+from rich.table import Table
+
+from auvest import (
+    CovarianceBudget,
+    FixedInterval,
+    MahalanobisInterval,
+    RangeBearing,
+    Status,
+    metrics,
+)
+from auvest.commands import console
+from auvest.commands.console import EXIT_CODES, ExitCode, Terminal
+from auvest.commands.files import write_csv
+from auvest.commands.version import version
+from auvest.intervals import IntervalPolicy
+from auvest.scenarios import paper_aukf
+from auvest.scenarios.paper_aukf import (
+    DTypeName,
+    FilterName,
+    NoiseKind,
+    TrackName,
+    observed_positions,
+)
+from auvest.scenarios.tracking import Scenario, TrackingResult, simulate
+
+Floats = npt.NDArray[np.float64]
+
+HELP = f"""Simulate the AUKF paper's scenario and show errors, intervals and consistency.
+
+A station at (0.2, 2) m tracks a vehicle by range and bearing (Deng, Yin, Duan 2019, section 3).
+The AUKF chooses its own sampling interval; ekf and ukf sample at a fixed one.
+
+Examples:
+
+  auvest simulate aukf
+
+  auvest simulate aukf --filter ukf --fixed-interval 0.6 --noise lognormal
+
+  auvest simulate aukf --interval covariance-budget --budget 0.08 --track turn
+
+  auvest simulate aukf --preset table1 --json > table1.json
+
+{EXIT_CODES}
+"""
+
+_FILTER = "Filter"
+_INTERVAL = "Sampling interval"
+_WORLD = "World"
+_MONTE_CARLO = "Monte Carlo"
+
+_NOISE = paper_aukf.paper_noise()
+_LAW = MahalanobisInterval()
+
+
+def command(
+    filter_name: Annotated[
+        FilterName, typer.Option("--filter", help="The filter.", rich_help_panel=_FILTER)
+    ] = "aukf",
+    alpha: Annotated[
+        float,
+        typer.Option(
+            callback=console.positive, help="Spread of the sigma points.", rich_help_panel=_FILTER
+        ),
+    ] = paper_aukf.ALPHA,
+    beta: Annotated[
+        float,
+        typer.Option(
+            callback=console.finite, help="Weight of prior knowledge.", rich_help_panel=_FILTER
+        ),
+    ] = paper_aukf.BETA,
+    kappa: Annotated[
+        float,
+        typer.Option(
+            callback=console.finite,
+            help="Second scale of the sigma points, above -6.",
+            rich_help_panel=_FILTER,
+        ),
+    ] = paper_aukf.KAPPA,
+    dtype: Annotated[
+        DTypeName,
+        typer.Option(
+            help="Precision; float32 gives the bits of the vehicle.", rich_help_panel=_FILTER
+        ),
+    ] = "float64",
+    interval: Annotated[
+        Literal["fixed", "mahalanobis", "covariance-budget"] | None,
+        typer.Option(
+            help="Interval policy.",
+            show_default="mahalanobis for aukf, fixed for ekf and ukf",
+            rich_help_panel=_INTERVAL,
+        ),
+    ] = None,
+    preset: Annotated[
+        Literal["figure3", "table1"] | None,
+        typer.Option(
+            help="Values of the paper's law (mahalanobis).",
+            show_default=_LAW.preset,
+            rich_help_panel=_INTERVAL,
+        ),
+    ] = None,
+    tau0: Annotated[
+        float | None,
+        typer.Option(
+            callback=console.open_unit,
+            help="First tau of the law, in (0, 1) (mahalanobis).",
+            show_default=f"{_LAW.tau0:g}",
+            rich_help_panel=_INTERVAL,
+        ),
+    ] = None,
+    fixed_interval: Annotated[
+        float | None,
+        typer.Option(
+            callback=console.positive,
+            help="The fixed interval, s (fixed).",
+            show_default=f"{paper_aukf.FIXED_INTERVAL_S:g}",
+            rich_help_panel=_INTERVAL,
+        ),
+    ] = None,
+    budget: Annotated[
+        float | None,
+        typer.Option(
+            callback=console.positive,
+            help="Position standard deviation allowed before an update, m (covariance-budget).",
+            show_default=f"{CovarianceBudget().position_sigma_m:g}",
+            rich_help_panel=_INTERVAL,
+        ),
+    ] = None,
+    track: Annotated[
+        TrackName,
+        typer.Option(
+            help="paper: Eq. (4) as it is printed; straight: the same, exact in time; "
+            f"turn: {paper_aukf.TURN_RATE_RAD_S:g} rad/s.",
+            rich_help_panel=_WORLD,
+        ),
+    ] = "paper",
+    noise: Annotated[
+        NoiseKind,
+        typer.Option(
+            help="Kind of both noises: U(0,1), N(0,1) or exp(N(0,1)).", rich_help_panel=_WORLD
+        ),
+    ] = "normal",
+    range_noise: Annotated[
+        float,
+        typer.Option(
+            callback=console.positive, help="Scale of the range noise, m.", rich_help_panel=_WORLD
+        ),
+    ] = _NOISE.range_m,
+    bearing_noise: Annotated[
+        float,
+        typer.Option(
+            callback=console.positive,
+            help="Scale of the bearing noise, rad.",
+            rich_help_panel=_WORLD,
+        ),
+    ] = _NOISE.bearing_rad,
+    noise_bias: Annotated[
+        Literal["keep", "remove"],
+        typer.Option(
+            help="Uniform and lognormal noise have a mean: keep it, as in the paper, or remove it.",
+            rich_help_panel=_WORLD,
+        ),
+    ] = "keep",
+    dropout: Annotated[
+        float,
+        typer.Option(
+            callback=console.fraction,
+            help="Probability that a measurement is missing.",
+            rich_help_panel=_WORLD,
+        ),
+    ] = 0.0,
+    steps: Annotated[
+        int,
+        typer.Option(min=2, max=100_000, help="Samples of each run.", rich_help_panel=_MONTE_CARLO),
+    ] = paper_aukf.STEPS,
+    runs: console.Runs = 200,
+    seed: console.Seed = 1,
+    workers: console.Workers = None,
+    output: Annotated[
+        Path,
+        typer.Option(
+            file_okay=False,
+            help="Folder for figure, CSV and JSON; made if missing.",
+            rich_help_panel="Output",
+        ),
+    ] = Path("auvest-output/simulate-aukf"),
+    no_figure: Annotated[
+        bool, typer.Option("--no-figure", help="Draw nothing.", rich_help_panel="Output")
+    ] = False,
+    as_json: console.Json = False,
+    quiet: console.Quiet = False,
+) -> None:
+    """Simulate; the help text is :data:`HELP`."""
+    terminal = Terminal(as_json=as_json, quiet=quiet)
+    policy = _interval_policy(
+        filter_name, interval, preset=preset, tau0=tau0, fixed=fixed_interval, budget=budget
+    )
+    world = paper_aukf.paper_noise(
+        noise,
+        range_m=range_noise,
+        bearing_rad=bearing_noise,
+        centred=noise_bias == "remove",
+        dropout=dropout,
+    )
+    with terminal.usage_errors():
+        filter_ = paper_aukf.paper_filter(
+            filter_name,
+            noise=world,
+            track=track,
+            interval=policy,
+            alpha=alpha,
+            beta=beta,
+            kappa=kappa,
+            dtype=dtype,
+        )
+        scenario = Scenario(
+            track=paper_aukf.paper_track(track),
+            noise=world,
+            steps=steps,
+            runs=runs,
+            seed=seed,
+            interval_s=getattr(policy, "interval_s", paper_aukf.FIXED_INTERVAL_S),
+        )
+    settings = {
+        "filter": filter_name,
+        "interval": {"policy": type(policy).__name__, **asdict(policy)},
+        "alpha": alpha,
+        "beta": beta,
+        "kappa": kappa,
+        "dtype": dtype,
+        "track": track,
+        "noise": asdict(world),
+        "steps": steps,
+        "runs": runs,
+        "seed": seed,
+    }
+    terminal.make_folder(output)
+
+    interrupted = False
+    with terminal.progress("runs") as progress:
+        try:
+            result = simulate(filter_, scenario, workers=workers, progress=progress)
+        except KeyboardInterrupt as stop:
+            interrupted = True
+            partial: TrackingResult | None = getattr(stop, "partial", None)
+            if partial is None:
+                terminal.fail("interrupted: no run was done", ExitCode.INTERRUPTED)
+            result = partial
+
+    values = measures(result)
+    per_step = means_per_step(result)
+    with terminal.writing(output):
+        files = {
+            "per_step": write_csv(output / "per_step.csv", per_step),
+            "one_run": write_csv(output / "one_run.csv", one_run(result, filter_.measurement)),
+        }
+        if not no_figure:
+            files["figure"] = _draw(
+                output / "figure.png", result, filter_.measurement, filter_name, policy
+            )
+        files["results"] = output / "results.json"
+        document = {
+            "command": "simulate aukf",
+            "version": version(),
+            "settings": settings,
+            "complete": not interrupted,
+            "results": values,
+            "per_step": per_step,
+            "files": {name: str(path) for name, path in files.items()},
+        }
+        files["results"].write_text(console.to_json(document) + "\n", encoding="utf-8")
+
+    terminal.result_json(document)
+    terminal.result(_table(values, settings))
+    for name, path in files.items():
+        terminal.result(f"{name.replace('_', ' '):9} {path}")
+    if interrupted:
+        terminal.fail(
+            f"interrupted: {values['runs']} of {runs} runs are done and kept", ExitCode.INTERRUPTED
+        )
+    if values["failed_runs"]:
+        first = int(np.flatnonzero(result.failed)[0])
+        terminal.fail(
+            f"{values['failed_runs']} of {values['runs']} runs failed; the first, run {first}, "
+            f"after {int(result.samples[first])} steps: {Status(int(result.status[first])).name}",
+            ExitCode.FAILED,
+        )
+
+
+def _interval_policy(
+    filter_name: str,
+    interval: str | None,
+    *,
+    preset: Literal["figure3", "table1"] | None,
+    tau0: float | None,
+    fixed: float | None,
+    budget: float | None,
+) -> IntervalPolicy:
+    """Build the policy that the options ask for; options of another policy are refused."""
+    kind = interval or ("mahalanobis" if filter_name == "aukf" else "fixed")
+    if filter_name != "aukf" and kind != "fixed":
+        raise typer.BadParameter(
+            f"'{kind}' needs --filter aukf; {filter_name} samples at a fixed interval.",
+            param_hint="'--interval'",
+        )
+    owners = {
+        "--preset": ("mahalanobis", preset),
+        "--tau0": ("mahalanobis", tau0),
+        "--fixed-interval": ("fixed", fixed),
+        "--budget": ("covariance-budget", budget),
+    }
+    for option, (owner, value) in owners.items():
+        if value is not None and owner != kind:
+            raise typer.BadParameter(
+                f"belongs to --interval {owner}, not to {kind}.", param_hint=f"'{option}'"
+            )
+    try:
+        if kind == "fixed":
+            return FixedInterval() if fixed is None else FixedInterval(interval_s=fixed)
+        if kind == "covariance-budget":
+            return (
+                CovarianceBudget() if budget is None else CovarianceBudget(position_sigma_m=budget)
+            )
+        return MahalanobisInterval(preset or _LAW.preset, tau0=tau0)
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint=f"'--interval {kind}'") from None
+
+
+def measures(result: TrackingResult) -> dict[str, Any]:
+    """Compute the numbers of the table."""
+    runs = len(result.samples)
+    square = np.square(result.error).sum(axis=-1)
+    seen = np.isfinite(square).any(axis=1)
+    per_run = np.nanmean(square[seen], axis=1)
+    rmse = result.rmse_m
+    spread = float(per_run.std(ddof=1) / np.sqrt(len(per_run))) if len(per_run) > 1 else np.nan
+    nis = result.nis[np.isfinite(result.nis)]
+    nis_bounds = metrics.chi2_bounds(2, nis.size) if nis.size else (np.nan, np.nan)
+    nees = result.nees
+    nees_per_step = np.array([_mean(nees[:, k]) for k in range(nees.shape[1])])
+    nees_bounds = metrics.chi2_bounds(2, int(seen.sum())) if seen.any() else (np.nan, np.nan)
+    inside = (nees_per_step >= nees_bounds[0]) & (nees_per_step <= nees_bounds[1])
+    interval = result.mean_interval_s
+    return {
+        "runs": runs,
+        "failed_runs": int(result.failed.sum()),
+        "samples": int(result.samples.sum()),
+        "rmse_m": rmse,
+        "rmse_standard_error_m": spread / (2 * rmse) if rmse > 0 else np.nan,
+        "rmse_x_m": metrics.rmse(result.error[..., :1]),
+        "rmse_y_m": metrics.rmse(result.error[..., 1:]),
+        "mean_interval_s": interval,
+        "samples_per_second": 1 / interval if interval > 0 else np.nan,
+        "nis_mean": _mean(result.nis),
+        "nis_bounds_95": list(nis_bounds),
+        "nees_mean": _mean(nees),
+        "nees_bounds_95_per_step": list(nees_bounds),
+        "nees_steps_inside": float(inside.mean()),
+    }
+
+
+def means_per_step(result: TrackingResult) -> dict[str, Floats]:
+    """Average over the runs, per step: time, interval, errors, consistency."""
+    led = np.diff(result.time_s, axis=1, prepend=0.0)
+    error = result.error
+    columns = {
+        "time_s": result.time_s,
+        "interval_s": led,
+        "rms_error_x_m": np.square(error[..., 0]),
+        "rms_error_y_m": np.square(error[..., 1]),
+        "rmse_m": np.square(error).sum(axis=-1),
+        "nis": result.nis,
+        "nees": result.nees,
+    }
+    table = {"step": np.arange(1.0, led.shape[1] + 1)}
+    for name, values in columns.items():
+        mean = np.array([_mean(values[:, k]) for k in range(values.shape[1])])
+        table[name] = np.sqrt(mean) if name.startswith("rms") else mean
+    return table
+
+
+def one_run(result: TrackingResult, sensor: RangeBearing, run: int = 0) -> dict[str, Floats]:
+    """Collect everything about one run, per step."""
+    truth, x, z = result.truth[run], result.x[run], result.z[run]
+    seen = observed_positions(z, sensor.station)
+    sigma = np.sqrt(np.diagonal(result.position_covariance[run], axis1=-2, axis2=-1))
+    columns = {
+        "step": np.arange(1.0, len(x) + 1),
+        "time_s": result.time_s[run],
+        "interval_s": np.diff(result.time_s[run], prepend=0.0),
+        "true_x_m": truth[:, 0],
+        "true_y_m": truth[:, 1],
+        "range_m": z[:, 0],
+        "bearing_rad": z[:, 1],
+        "observed_x_m": seen[:, 0],
+        "observed_y_m": seen[:, 1],
+    }
+    units = ("x_m", "y_m", "vx_m_s", "vy_m_s", "ax_m_s2", "ay_m_s2")
+    columns.update({f"estimated_{name}": x[:, i] for i, name in enumerate(units)})
+    columns["sigma_x_m"], columns["sigma_y_m"] = sigma[:, 0], sigma[:, 1]
+    columns["nis"] = result.nis[run]
+    return columns
+
+
+def _mean(values: Floats) -> float:
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if known.size else float("nan")
+
+
+def _draw(
+    path: Path,
+    result: TrackingResult,
+    sensor: RangeBearing,
+    name: str,
+    policy: IntervalPolicy,
+) -> Path:
+    from auvest import plots  # here, because matplotlib takes long to import
+
+    colour = plots.FILTER_COLOURS[name]
+    led = np.diff(result.time_s, axis=1, prepend=0.0)
+    known = np.where(np.isfinite(led), led, np.nan)
+    mean = means_per_step(result)["interval_s"]
+    complete = known[np.isfinite(known).all(axis=1)]
+    low, high = (np.quantile(complete, q, axis=0) if len(complete) else None for q in (0.05, 0.95))
+    pace = [plots.Line("mean, 5 to 95 %", mean, low=low, high=high, colour=colour)]
+    if not isinstance(policy, FixedInterval):
+        fixed = np.full(len(mean), paper_aukf.FIXED_INTERVAL_S)
+        pace.append(plots.Line("fixed, Table 1", fixed, colour=plots.BLACK, style="--"))
+    sigma = np.sqrt(np.diagonal(result.position_covariance[0], axis1=-2, axis2=-1))
+    noise = result.scenario.noise
+    figure = plots.simulation_figure(
+        result.truth[0],
+        result.x[0, :, :2],
+        observed_positions(result.z[0], sensor.station),
+        station=sensor.station,
+        time_s=result.time_s[0],
+        error_m=result.error[0],
+        sigma_m=sigma,
+        intervals=pace,
+        title=f"{name.upper()}, {noise.kind} noise {noise.range_m:g} m, {noise.bearing_rad:g} rad: "
+        f"RMSE {result.rmse_m:.3g} m, mean interval {result.mean_interval_s:.3g} s",
+        label=f"{name.upper()} estimate",
+        colour=colour,
+    )
+    return plots.save(figure, path)
+
+
+def _table(values: dict[str, Any], settings: dict[str, Any]) -> Table:
+    noise = settings["noise"]
+    bias = ", bias removed" if noise["centred"] else ""
+    table = Table(
+        title=f"{settings['filter'].upper()}, {settings['interval']['policy']}: "
+        f"{values['runs']} runs of {settings['steps']} steps, {noise['kind']} noise "
+        f"({noise['range_m']:g} m, {noise['bearing_rad']:g} rad{bias}), "
+        f"track {settings['track']}, seed {settings['seed']}, {settings['dtype']}",
+        title_justify="left",
+        title_style="bold",
+    )
+    for title, justify in (("quantity", "left"), ("value", "right"), ("note", "left")):
+        table.add_column(title, justify=justify)  # type: ignore[arg-type]
+    low, high = values["nis_bounds_95"]
+    nees_low, nees_high = values["nees_bounds_95_per_step"]
+    rows = (
+        ("position RMSE / m", f"{values['rmse_m']:.4f}",
+         f"standard error {values['rmse_standard_error_m']:.1g}"),
+        ("RMSE x, y / m", f"{values['rmse_x_m']:.4f}, {values['rmse_y_m']:.4f}", ""),
+        ("mean interval / s", f"{values['mean_interval_s']:.4f}",
+         f"{values['samples_per_second']:.3g} samples per second"),
+        ("samples", f"{values['samples']}", "of all runs"),
+        ("NIS, mean", f"{values['nis_mean']:.3f}",
+         f"consistent: {low:.3f} to {high:.3f} (95 %, chi-square); below: cautious"),
+        ("NEES of position, mean", f"{values['nees_mean']:.3f}",
+         f"expected 2; {100 * values['nees_steps_inside']:.0f} % of steps within "
+         f"{nees_low:.2f} to {nees_high:.2f}"),
+        ("failed runs", f"{values['failed_runs']}", ""),
+    )  # fmt: skip
+    for row in rows:
+        table.add_row(*row)
+    return table

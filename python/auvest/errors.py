@@ -1,0 +1,41 @@
+"""What the filters raise when a step cannot be done.
+
+Wrong arguments are plain ``ValueError`` and ``TypeError`` that name the argument.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from auvest._core import Status, describe
+
+
+class FilterError(ValueError):
+    """A filter could not do a step; it stays as it was before that step.
+
+    Attributes
+    ----------
+    status : Status
+        What the core reported.
+    step : int or None
+        Row of the record that failed, for ``run``; else None.
+    partial : RunResult or None
+        Results of the rows before it, for ``run``; else None.
+    """
+
+    def __init__(
+        self, action: str, status: Status, *, step: int | None = None, partial: Any = None
+    ) -> None:
+        where = "" if step is None else f" at row {step}"
+        super().__init__(f"{action}{where}: {describe(status)}")
+        self.action = action
+        self.status = status
+        self.step = step
+        self.partial = partial
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _rebuild, (self.action, self.status, self.step, self.partial)
+
+
+def _rebuild(action: str, status: Status, step: int | None, partial: Any) -> FilterError:
+    return FilterError(action, status, step=step, partial=partial)

@@ -1,0 +1,280 @@
+"""Figures: one style, colours that colour-blind readers can tell apart, units on every axis.
+
+The functions return :class:`matplotlib.figure.Figure` objects and never touch pyplot or the global
+style, so they can be used in any program and thread; :func:`save` writes one as a PNG.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+Floats = npt.NDArray[np.float64]
+
+DPI = 110
+# Okabe and Ito (2008).
+BLACK = "#000000"
+BLUE = "#0072B2"
+SKY = "#56B4E9"
+GREEN = "#009E73"
+ORANGE = "#E69F00"
+VERMILION = "#D55E00"
+GREY = "#777777"
+
+#: One colour per filter, the same in every figure.
+FILTER_COLOURS: Mapping[str, str] = {"ukf": VERMILION, "aukf": BLUE, "ekf": GREEN}
+_CYCLE = (BLUE, VERMILION, GREEN, ORANGE, SKY, GREY)
+
+
+@dataclass(frozen=True)
+class Line:
+    """One curve: values per step, with a band around it if given, and its name in the legend."""
+
+    label: str
+    y: Floats
+    x: Floats | None = None
+    low: Floats | None = None
+    high: Floats | None = None
+    colour: str | None = None
+    style: str = "-"
+
+
+def track_figure(
+    truth: Floats,
+    estimate: Floats,
+    observed: Floats,
+    *,
+    station: Sequence[float],
+    title: str,
+    label: str = "estimated",
+    colour: str = BLUE,
+) -> Figure:
+    """Draw reference, observed and estimated track, and how far they lie from the reference.
+
+    Parameters
+    ----------
+    truth, estimate, observed : ndarray, shape (T, 2)
+        Positions in m; ``observed`` is range and bearing turned into a position.
+    station : (float, float)
+        Position of the base station, m.
+    title : str
+        What the reader sees.
+    label, colour : str
+        Name and colour of the estimated track.
+    """
+    figure = new_figure((8.0, 4.4), title)
+    grid = figure.add_gridspec(2, 2, width_ratios=(1.0, 1.5))
+    plane = figure.add_subplot(grid[:, 0])
+    _draw_tracks(plane, truth, estimate, observed, station, label, colour)
+    steps = np.arange(1, len(truth) + 1)
+    for row, name in enumerate("xy"):
+        axes = figure.add_subplot(grid[row, 1])
+        axes.plot(
+            steps, observed[:, row] - truth[:, row], "-.", color=GREY, linewidth=0.7, marker=".",
+            markersize=3,
+        )  # fmt: skip
+        axes.plot(steps, estimate[:, row] - truth[:, row], "--", color=colour, linewidth=1.8)
+        axes.axhline(0.0, color=BLACK, linewidth=1.6, zorder=1)
+        axes.set_ylabel(f"{name} off the reference / m")
+        style(axes)
+    axes.set_xlabel("step")
+    style(plane)
+    legend_below(figure, plane, columns=4)
+    return figure
+
+
+def step_figure(
+    lines: Sequence[Line], *, title: str, ylabel: str, xlabel: str = "step", zero: bool = False
+) -> Figure:
+    """Draw curves over the step number, or over ``Line.x`` where a line has one."""
+    figure = new_figure((6.6, 4.4), title)
+    axes = figure.add_subplot()
+    _draw_lines(axes, lines)
+    axes.set(xlabel=xlabel, ylabel=ylabel)
+    if zero:
+        axes.axhline(0.0, color=BLACK, linewidth=0.6, zorder=1)
+    style(axes)
+    legend_below(figure, axes, columns=2)
+    return figure
+
+
+def error_figure(
+    runs: Sequence[Line], spread: Sequence[Line], *, title: str, axis: str = "x"
+) -> Figure:
+    """Draw the error per step of one run, and below it the root mean square over all runs."""
+    figure = new_figure((6.6, 5.6), title)
+    top = figure.add_subplot(2, 1, 1)
+    bottom = figure.add_subplot(2, 1, 2, sharex=top)
+    _draw_lines(top, runs)
+    top.axhline(0.0, color=BLACK, linewidth=0.6, zorder=1)
+    top.set_ylabel(f"{axis} error, one run / m")
+    top.tick_params(labelbottom=False)
+    _draw_lines(bottom, spread)
+    bottom.set(xlabel="step", ylabel=f"{axis} error, rms / m")
+    bottom.set_ylim(bottom=0.0)
+    style(top)
+    style(bottom)
+    legend_below(figure, bottom, columns=3)
+    return figure
+
+
+def simulation_figure(
+    truth: Floats,
+    estimate: Floats,
+    observed: Floats,
+    *,
+    station: Sequence[float],
+    time_s: Floats,
+    error_m: Floats,
+    sigma_m: Floats,
+    intervals: Sequence[Line],
+    title: str,
+    label: str,
+    colour: str,
+) -> Figure:
+    """Draw one run of ``auvest simulate``: tracks, interval and error with its three-sigma bounds.
+
+    Parameters
+    ----------
+    truth, estimate, observed : ndarray, shape (T, 2)
+        Positions, m.
+    station : (float, float)
+        Position of the base station, m.
+    time_s : ndarray, shape (T,)
+        Time of the samples.
+    error_m, sigma_m : ndarray, shape (T, 2)
+        Error of the estimate and the filter's own standard deviation of it, along x and y.
+    intervals : sequence of Line
+        Sampling intervals over the step number, s.
+    title, label, colour : str
+        Title of the whole, name and colour of the estimate.
+    """
+    figure = new_figure((10.0, 6.0), title)
+    grid = figure.add_gridspec(3, 2, width_ratios=(1.0, 1.25))
+    plane = figure.add_subplot(grid[:, 0])
+    _draw_tracks(plane, truth, estimate, observed, station, label, colour)
+    style(plane)
+    plane.set_title("tracks, one run", loc="left")
+    _legend_inside(plane)
+
+    pace = figure.add_subplot(grid[0, 1])
+    _draw_lines(pace, intervals)
+    pace.set(xlabel="step", ylabel="T / s")
+    pace.set_ylim(bottom=0.0)
+    style(pace)
+    pace.set_title("sampling interval", loc="left")
+    _legend_above(pace)
+
+    for row, name in enumerate("xy"):
+        axes = figure.add_subplot(grid[row + 1, 1])
+        bound = 3.0 * sigma_m[:, row]
+        band = Line(
+            "error", error_m[:, row], x=time_s, low=-bound, high=bound, colour=colour, style=".-"
+        )
+        _draw_lines(axes, [band], band_label="±3 sigma of the filter")
+        axes.axhline(0.0, color=BLACK, linewidth=0.6, zorder=1)
+        axes.set_ylabel(f"{name} error / m")
+        style(axes)
+        if row == 0:
+            axes.set_title("error, one run", loc="left")
+            _legend_above(axes)
+            axes.tick_params(labelbottom=False)
+        else:
+            axes.set_xlabel("time / s")
+    return figure
+
+
+def save(figure: Figure, path: Path) -> Path:
+    """Write a figure as PNG, the same bytes for the same figure, and return the path."""
+    figure.savefig(path, format="png", dpi=DPI, metadata={"Software": None})
+    return path
+
+
+def new_figure(size: tuple[float, float], title: str) -> Figure:
+    """Make an empty figure of that size in inches."""
+    figure = Figure(figsize=size, dpi=DPI, layout="constrained")
+    figure.suptitle(title, fontsize=12)
+    return figure
+
+
+def style(axes: Axes) -> None:
+    """Give axes the grid and the sizes that all our figures have."""
+    axes.grid(True, color="#dddddd", linewidth=0.6)
+    axes.set_axisbelow(True)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    for label in (axes.xaxis.label, axes.yaxis.label):
+        label.set_fontsize(9.5)
+    axes.tick_params(labelsize=9)
+
+
+def legend_below(figure: Figure, axes: Axes, columns: int) -> None:
+    """Put the legend of these axes below the whole figure."""
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(
+        handles, labels, loc="outside lower center", ncols=columns, fontsize=9, frameon=False
+    )
+
+
+def _legend_above(axes: Axes) -> None:
+    axes.legend(
+        loc="lower right",
+        bbox_to_anchor=(1.0, 0.98),
+        ncols=2,
+        fontsize=9,
+        frameon=False,
+        borderpad=0.2,
+        handlelength=1.6,
+        columnspacing=1.2,
+    )
+    axes.title.set_fontsize(10.5)
+
+
+def _legend_inside(axes: Axes) -> None:
+    axes.legend(fontsize=9, framealpha=0.85, edgecolor="none", loc="best")
+
+
+def _draw_lines(axes: Axes, lines: Sequence[Line], band_label: str | None = None) -> None:
+    for i, line in enumerate(lines):
+        x = np.arange(len(line.y)) if line.x is None else line.x
+        colour = line.colour or _CYCLE[i % len(_CYCLE)]
+        if line.low is not None and line.high is not None:
+            axes.fill_between(
+                x, line.low, line.high, color=colour, alpha=0.18, linewidth=0, label=band_label
+            )
+        axes.plot(
+            x, line.y, line.style, color=colour, linewidth=1.5, markersize=3.5, label=line.label
+        )
+    axes.xaxis.set_major_locator(MaxNLocator(nbins=8, integer=True))
+
+
+def _draw_tracks(
+    axes: Axes,
+    truth: Floats,
+    estimate: Floats,
+    observed: Floats,
+    station: Sequence[float],
+    label: str,
+    colour: str,
+) -> None:
+    axes.plot(
+        observed[:, 0], observed[:, 1], "-.", color=GREY, linewidth=0.7, marker=".",
+        markersize=3, alpha=0.8, label="observed",
+    )  # fmt: skip
+    axes.plot(truth[:, 0], truth[:, 1], "-", color=BLACK, linewidth=1.6, label="reference = truth")
+    axes.plot(estimate[:, 0], estimate[:, 1], "--", color=colour, linewidth=1.8, label=label)
+    axes.plot(*station, "^", color=GREEN, markersize=8, label="station and start", linestyle="none")
+    axes.set(xlabel="x / m", ylabel="y / m")
+    axes.set_aspect("equal", adjustable="datalim")
+
+
+def pair(x: Floats, y: Floats) -> Floats:
+    """Join two columns to points (T, 2)."""
+    return np.stack([x, y], axis=-1)

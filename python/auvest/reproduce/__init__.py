@@ -1,0 +1,1 @@
+"""Papers reproduced: every figure and claim beside what this package measures."""

@@ -1,0 +1,78 @@
+"""The wheel and the sdist: what they contain, and that the wheel works outside the source tree."""
+
+import re
+import subprocess
+import sys
+import tarfile
+import zipfile
+from importlib.metadata import version
+
+import pytest
+
+
+@pytest.fixture(scope="module")
+def declared_version(root):
+    """Return the version that pyproject.toml declares."""
+    text = (root / "pyproject.toml").read_text()
+    return re.search(r'^version = "(.+)"$', text, re.MULTILINE)[1]
+
+
+@pytest.fixture(scope="module")
+def wheel(root, tmp_path_factory):
+    """Return the path of a fresh wheel; compiled objects of earlier builds are reused."""
+    folder = tmp_path_factory.mktemp("wheel")
+    command = [sys.executable, "-m", "pip", "wheel", "--no-deps", "--no-build-isolation", root]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    (wheel,) = folder.glob("*.whl")
+    return wheel
+
+
+def test_version_has_one_source(declared_version, wheel):
+    assert version("auvest") == declared_version
+    assert wheel.name.split("-")[:2] == ["auvest", declared_version]
+
+
+def test_wheel_contents(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        names = archive.namelist()
+    package = [name for name in names if ".dist-info/" not in name]
+    assert {"auvest/__init__.py", "auvest/_core.pyi", "auvest/py.typed"} <= set(package)
+    assert [name for name in package if re.fullmatch(r"auvest/_core\..*\.so", name)]
+    # No tests, no C++, no caches: only the package.
+    assert not [name for name in package if not name.startswith("auvest/")]
+    assert not [name for name in package if re.search(r"test|\.[ch]pp$|__pycache__", name)]
+
+
+def test_wheel_outside_the_source_tree(wheel, declared_version, tmp_path, run):
+    run(sys.executable, "-m", "venv", "--without-pip", tmp_path / "venv")
+    python = tmp_path / "venv" / "bin" / "python"
+    run(
+        *(sys.executable, "-m", "pip", "--python", python),
+        *("install", "--no-deps", "--no-index", wheel),
+    )
+    # The dependencies come from this environment, behind the new one's own packages. An editable
+    # auvest among them stays out: its .pth file counts in a site folder only.
+    dependencies = [p for p in sys.path if p.endswith("site-packages")]
+    code = (
+        f"import sys; sys.path += {dependencies!r}\n"
+        "import auvest._core, auvest.cli, importlib.metadata\n"
+        "print(importlib.metadata.version('auvest'), auvest.__file__, auvest._core.__file__, "
+        "sep='\\n', flush=True)\n"
+        "auvest.cli.app(['simulate', 'aukf', '--runs', '2'])"
+    )
+    found, *files = run(python, "-c", code).splitlines()[:3]
+    assert found == declared_version
+    assert all(file.startswith(str(tmp_path)) for file in files)
+
+
+def test_sdist_contents(root, tmp_path, declared_version, run):
+    code = "import scikit_build_core.build as backend, sys; print(backend.build_sdist(sys.argv[1]))"
+    run(sys.executable, "-c", code, tmp_path, cwd=root)
+    with tarfile.open(tmp_path / f"auvest-{declared_version}.tar.gz") as archive:
+        names = {name.split("/", 1)[1] for name in archive.getnames()}
+    needed = ["CMakeLists.txt", "pyproject.toml", "README.md", "LICENSE", "cpp", "python", "tests"]
+    for entry in needed:
+        paths = [root / entry] if (root / entry).is_file() else (root / entry).rglob("*.*pp")
+        assert {str(path.relative_to(root)) for path in paths} <= names
+    assert not [name for name in names if name.startswith(("build/", "dist/", ".venv/", ".git/"))]

@@ -1,0 +1,152 @@
+"""Save and restore, pickle and copy: the filter goes on with the same bits."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+from filter_support import DTYPES, everything, make, measure, same_bits, straight
+
+import auvest
+
+LAWS = (
+    None,
+    auvest.MahalanobisInterval("table1", tau0=0.3),
+    auvest.CovarianceBudget(position_sigma_m=0.2),
+    auvest.FixedInterval(interval_s=0.4),
+)
+KINDS = [(auvest.Ekf, None), (auvest.Ukf, None), *((auvest.Aukf, law) for law in LAWS[1:])]
+Z = measure(straight(40))
+
+
+def build(kind, law, dtype):
+    options = {} if law is None else {"interval": law}
+    if kind is not auvest.Ekf:
+        options["alpha"] = 1e-3
+    return make(
+        kind,
+        dtype,
+        process=auvest.ConstantAcceleration(discretisation="euler", velocity_psd=1e-3),
+        measurement=auvest.RangeBearing(station=(0.1, 1.9), sigma_range_m=0.07),
+        **options,
+    )
+
+
+def drive(f, z):
+    """Goes on for the rows of z; all that was seen on the way."""
+    seen = []
+    for row in z:
+        if isinstance(f, auvest.Aukf):
+            f.predict()
+            f.update(row)
+            f.feedback(row)
+        else:
+            f.predict(0.5)
+            f.update(row)
+        seen.append(everything(f))
+    return seen
+
+
+def by_save(f, kind, law, dtype):
+    other = build(kind, law, dtype)
+    drive(other, Z[:3])  # a state of its own, to be replaced
+    other.restore(f.save())
+    return other
+
+
+WAYS = {
+    "save": by_save,
+    "pickle": lambda f, *_: pickle.loads(pickle.dumps(f)),
+    "deepcopy": lambda f, *_: copy.deepcopy(f),
+    "copy": lambda f, *_: copy.copy(f),
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize(("kind", "law"), KINDS)
+def test_goes_on_with_the_same_bits(kind, law, dtype, way):
+    f = build(kind, law, dtype)
+    drive(f, Z[:20])
+    twin = WAYS[way](f, kind, law, dtype)
+    assert everything(twin) == everything(f)
+    expected = drive(f, Z[20:])
+    assert drive(twin, Z[20:]) == expected
+    assert expected[0] != expected[-1]
+    assert (twin.process, twin.measurement, twin.dtype) == (f.process, f.measurement, f.dtype)
+
+
+def test_copies_are_independent():
+    f = build(auvest.Aukf, LAWS[1], "float32")
+    drive(f, Z[:5])
+    before = everything(f)
+    drive(copy.deepcopy(f), Z[5:])
+    drive(copy.copy(f), Z[5:])
+    state = f.save()
+    state["x"][:] = 99
+    state["innovation"][:] = 99
+    assert everything(f) == before
+
+
+def test_a_fresh_filter_can_be_saved():
+    f = make(auvest.Ukf)
+    twin = pickle.loads(pickle.dumps(f))
+    assert everything(twin) == everything(f)
+    assert np.isnan(twin.nis)
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_the_near_field_flag_is_part_of_the_state(dtype):
+    f = auvest.Ukf([0.2, 2.0, 0, 0, 0, 0], np.eye(6), dtype=dtype)
+    f.update([0.3, 1.0])
+    assert f.near_field
+    assert everything(pickle.loads(pickle.dumps(f))) == everything(f)
+
+
+def test_status_survives_a_pickle_and_an_error_does_too():
+    f = make(auvest.Ukf, "float32")
+    with pytest.raises(auvest.FilterError) as caught:
+        f.run([[4.0, -0.8], [1e30, 0.0]], 0.5)
+    assert pickle.loads(pickle.dumps(f)).status == auvest.Status.overflow
+    error = pickle.loads(pickle.dumps(caught.value))
+    assert str(error) == str(caught.value)
+    assert (error.step, error.status) == (1, auvest.Status.overflow)
+    assert same_bits(error.partial.P, caught.value.partial.P)
+
+
+def damaged(**changes):
+    state = make(auvest.Ukf, "float32").save()
+    for key, value in changes.items():
+        if value is None:
+            del state[key]
+        else:
+            state[key] = value
+    return state
+
+
+@pytest.mark.parametrize(
+    ("state", "error", "message"),
+    [
+        ([1, 2], TypeError, r"state must be a dict from save\(\), not list"),
+        ({}, ValueError, r"state\['format'\] is None, expected 1"),
+        (make(auvest.Ekf, "float32").save(), ValueError, "is 'Ekf', expected 'Ukf'"),
+        (make(auvest.Ukf, "float64").save(), ValueError, "is 'float64', expected 'float32'"),
+        (damaged(P=None), ValueError, "state has no 'P'"),
+        (damaged(nis=None), ValueError, "state has no 'nis'"),
+        (damaged(x=np.zeros(5)), ValueError, r"state\['x'\] has shape \(5,\), expected \(6,\)"),
+        (damaged(x=np.full(6, np.nan)), ValueError, r"state\['x'\]\[0\] is nan"),
+        (damaged(P=-np.eye(6)), ValueError, "not symmetric positive definite"),
+        (damaged(interval=-1.0), ValueError, r"state\['interval'\] must be positive"),
+        (damaged(law=(1, 2)), ValueError, "four numbers and two positions"),
+        (damaged(S=np.eye(3)), ValueError, r"state\['S'\] has shape \(3, 3\)"),
+    ],
+)
+def test_a_wrong_state_is_refused_and_changes_nothing(state, error, message):
+    f = make(auvest.Ukf, "float32")
+    f.update([4.0, -0.8])
+    before = everything(f)
+    with pytest.raises(error, match=message):
+        f.restore(state)
+    assert everything(f) == before
