@@ -110,13 +110,7 @@ build-release: setup-dev
 
 .PHONY: bench math-accuracy
 bench: build-release install-editable ## instructions and time per step, beside filterpy and Numba
-	build/release/cpp/benchmarks/ukf_step
-	for scalar in float double; do \
-	    valgrind --tool=callgrind --callgrind-out-file=/dev/null \
-	        --toggle-collect=ukf_step_$$scalar build/release/cpp/benchmarks/ukf_step 1000 2>&1 | \
-	        awk -v s=$$scalar '/Collected/ {print "instructions per step, " s ": " $$NF / 1000}'; \
-	done
-	$(PY) -m pytest --benchmark-enable --benchmark-only
+	$(PY) cpp/benchmarks/speed.py build/release/cpp/benchmarks/ukf_step --write docs/speed.md
 
 math-accuracy: build-release ## errors of the float functions over all 2^32 arguments
 	build/release/cpp/tools/math_accuracy

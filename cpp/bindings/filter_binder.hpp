@@ -47,7 +47,7 @@ class FilterBinder {
             },
             py::arg("reference").noconvert())
         .def("run", &run, py::arg("z").noconvert(), py::arg("dt").noconvert(),
-             py::arg("reference").noconvert(), py::arg("sensor"))
+             py::arg("reference").noconvert(), py::arg("sensor"), py::arg("covariance"))
         .def("simulate", &simulate, py::arg("x0").noconvert(), py::arg("P0").noconvert(),
              py::arg("sensor"), py::arg("scenario"))
         .def("save", &save)
@@ -73,17 +73,19 @@ class FilterBinder {
 
   /// A record of T rows. dt[k] is the time before row k, NaN for the interval the filter chose;
   /// a NaN row of z is a missing measurement; a NaN row of reference stands for the estimate.
+  /// Without `covariance` P and S have no rows.
   static py::dict run(Adaptive& filter, const Array<Scalar>& z, const Array<Scalar>& dt,
-                      const Array<Scalar>& reference, const Sensor& sensor) {
+                      const Array<Scalar>& reference, const Sensor& sensor, bool covariance) {
     require_shape(z, {-1, kSize}, "z");
     const py::ssize_t rows = z.shape(0);
     require_shape(dt, {rows}, "dt");
     require_shape(reference, {rows, 2}, "reference");
 
     py::array_t<Scalar> x({rows, py::ssize_t(kStates)});
-    py::array_t<Scalar> p({rows, py::ssize_t(kStates), py::ssize_t(kStates)});
+    const py::ssize_t full = covariance ? rows : 0;
+    py::array_t<Scalar> p({full, py::ssize_t(kStates), py::ssize_t(kStates)});
     py::array_t<Scalar> innovation({rows, py::ssize_t(kSize)});
-    py::array_t<Scalar> s({rows, py::ssize_t(kSize), py::ssize_t(kSize)});
+    py::array_t<Scalar> s({full, py::ssize_t(kSize), py::ssize_t(kSize)});
     py::array_t<Scalar> nis(rows);
     py::array_t<Scalar> interval(rows);
     py::array_t<bool> near_field(rows);
@@ -100,15 +102,17 @@ class FilterBinder {
 
     py::ssize_t done = 0;
     Status status = Status::kOk;
+    Update nothing(Status::kOk);  // what a missing measurement records
+    Matrix<Scalar, kSize, kSize> last_s;
     {
       py::gil_scoped_release release;
       const Scalar nan = std::numeric_limits<Scalar>::quiet_NaN();
-      Update nothing(Status::kOk);
       for (int i = 0; i < kSize; ++i) {
         nothing.innovation(i) = nan;
         for (int j = 0; j < kSize; ++j) nothing.S(i, j) = nan;
       }
       nothing.nis = nan;
+      last_s = nothing.S;
       for (; done < rows; ++done) {
         const typename Adaptive::BeliefType before = filter.belief();
         const Scalar elapsed = math::is_nan(dt_in[done]) ? filter.interval() : dt_in[done];
@@ -135,9 +139,12 @@ class FilterBinder {
           break;
         }
         copy_to(filter.x(), x_out + done * kStates);
-        copy_to(filter.P(), p_out + done * kStates * kStates);
         copy_to(u.innovation, innovation_out + done * kSize);
-        copy_to(u.S, s_out + done * kSize * kSize);
+        last_s = u.S;
+        if (covariance) {
+          copy_to(filter.P(), p_out + done * kStates * kStates);
+          copy_to(u.S, s_out + done * kSize * kSize);
+        }
         nis_out[done] = u.nis;
         interval_out[done] = filter.interval();
         near_out[done] = u.near_field;
@@ -150,6 +157,7 @@ class FilterBinder {
     result["P"] = p;
     result["innovation"] = innovation;
     result["S"] = s;
+    result["last_S"] = to_array(last_s);
     result["nis"] = nis;
     result["interval"] = interval;
     result["near_field"] = near_field;

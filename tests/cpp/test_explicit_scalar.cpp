@@ -1,8 +1,9 @@
 // The filters compile with a scalar that converts to nothing, and compute the bits of double.
+#include "explicit_scalar.hpp"  // before the filters, which find its functions by overload
+
 #include <doctest/doctest.h>
 
 #include "auvest/auvest.hpp"
-#include "explicit_scalar.hpp"
 
 namespace {
 

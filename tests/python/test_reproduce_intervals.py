@@ -90,14 +90,15 @@ def test_covariance_budget_dominates_without_heavy_tails(committed):
 
 
 def test_command(tmp_path, monkeypatch):
-    monkeypatch.setattr(intervals, "TRACKS", {"near, turning": intervals.TRACKS["near, turning"]})
+    turning = {name: track for name, track in intervals.TRACKS.items() if "turning" in name}
+    monkeypatch.setattr(intervals, "TRACKS", turning)
     monkeypatch.setattr(intervals, "NOISES", ("normal",))
-    monkeypatch.setattr(intervals, "BUDGETS", {"near": (0.2,)})
+    monkeypatch.setattr(intervals, "BUDGETS", {"near": (0.2,), "far": (0.5,)})
     command = ["reproduce", "intervals", "--runs", "3", "--output", str(tmp_path), "--json"]
     result = CliRunner().invoke(app, command)
     assert result.exit_code == 0, result.output
     document = json.loads(result.stdout)
-    assert [c["track"] for c in document["cases"]] == ["near, turning"]
+    assert [c["track"] for c in document["cases"]] == ["near, turning", "far, turning"]
     assert sorted(p.name for p in tmp_path.iterdir()) == [
         "README.md",
         "intervals.png",

@@ -79,6 +79,21 @@ def test_run_with_the_filters_own_interval(law, dtype):
     assert a.interval == result.interval_s[-1]
 
 
+@pytest.mark.parametrize("kind", FILTERS)
+def test_covariances_may_be_left_out(kind):
+    z, dt = record()
+    a, b = make(kind), make(kind)
+    whole, lean = a.run(z, dt=dt), b.run(z, dt=dt, covariance=False)
+    assert same_bits(whole.x, lean.x)
+    assert same_bits(whole.nis, lean.nis)
+    assert lean.P.shape == (0, 6, 6)
+    assert lean.S.shape == (0, 2, 2)
+    assert len(lean) == len(z)
+    assert everything(a) == everything(b)  # S of the last update too
+    with pytest.raises(TypeError, match="covariance must be"):
+        b.run(z, dt=dt, covariance="no")
+
+
 def test_a_record_may_be_split():
     z, dt = record()
     a, b = make(auvest.Ukf), make(auvest.Ukf)

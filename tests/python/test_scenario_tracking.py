@@ -338,3 +338,11 @@ BAD = [
 def test_bad_input(call, error, message):
     with pytest.raises(error, match=message):
         call()
+
+
+def test_position_at():
+    turn = tracking.Track(kind="turn", position=(1.0, 2.0), velocity=(0.5, 0.0), turn_rate=0.1)
+    # Half a turn later the vehicle is one diameter, 2 v / rate, to the left of its course.
+    assert turn.position_at(np.pi / 0.1) == pytest.approx((1.0, 12.0), abs=1e-12)
+    with pytest.raises(ValueError, match="time_s must not be negative"):
+        turn.position_at(-1.0)

@@ -22,8 +22,9 @@ static_assert(sizeof(float) == 4 && FLT_RADIX == 2 && FLT_MANT_DIG == 24,
               "auvest needs IEEE 754 binary32 as float");
 
 // A fixed trip count, written out by the compiler. It changes speed, never the order of operations.
-// (clang unrolls such loops by itself.)
-#if defined(__GNUC__) && __GNUC__ >= 8 && !defined(__clang__) && !defined(__AVR__)
+// (clang unrolls such loops by itself; gcc without optimisation would warn that it does not.)
+#if defined(__GNUC__) && __GNUC__ >= 8 && !defined(__clang__) && !defined(__AVR__) && \
+    defined(__OPTIMIZE__)
 #define AUVEST_UNROLL _Pragma("GCC unroll 16")
 #else
 #define AUVEST_UNROLL

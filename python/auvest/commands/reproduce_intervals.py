@@ -76,9 +76,7 @@ def write_results(
     from auvest.reproduce import intervals_figures
 
     (folder / "results.json").write_text(console.to_json(document) + "\n", encoding="utf-8")
-    (folder / "README.md").write_text(
-        intervals.page(cases, runs=runs, seed=seed), encoding="utf-8"
-    )
+    (folder / "README.md").write_text(intervals.page(cases, runs=runs, seed=seed), encoding="utf-8")
     plots.save(intervals_figures.plane(cases), folder / "intervals.png")
 
 

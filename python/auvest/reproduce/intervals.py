@@ -1,8 +1,8 @@
 """The interval policies side by side: ``auvest reproduce intervals``.
 
-Not in the paper. For each track, noise and error budget, the covariance budget runs first; the other
-policies are then set so that they take as many samples in the same time, and all are judged on the
-plane (error, samples per second) and by the time that the error spends above the budget.
+Not in the paper. For each track, noise and error budget, the covariance budget runs first; the
+other policies are then set so that they take as many samples in the same time, and all are judged
+on the plane (error, samples per second) and by the time that the error spends above the budget.
 """
 
 from __future__ import annotations
@@ -229,9 +229,7 @@ def _filter(track: Track, policy: IntervalPolicy) -> Aukf:
         np.array([*track.position, *track.velocity, *acceleration]),
         np.diag(np.repeat(np.square(P0_SIGMA), 2)),
         process=ConstantAcceleration(),
-        measurement=RangeBearing(
-            sigma_range_m=NOISE_SIGMA[0], sigma_bearing_rad=NOISE_SIGMA[1]
-        ),
+        measurement=RangeBearing(sigma_range_m=NOISE_SIGMA[0], sigma_bearing_rad=NOISE_SIGMA[1]),
         interval=policy,
         alpha=1e-3,
     )
@@ -286,9 +284,7 @@ def page(cases: list[Case], *, runs: int, seed: int) -> str:
     calm = [case for case in cases if case.noise != "lognormal"]
     calm_won = [case for case in calm if case.dominates]
     against_fixed = [
-        case
-        for case in cases
-        if case.policies["budget"].above < case.policies["fixed"].above
+        case for case in cases if case.policies["budget"].above < case.policies["fixed"].above
     ]
     text = f"""# Interval policies at equal sampling rate
 
@@ -305,12 +301,13 @@ sigma; the error budget is {BUDGET_SIGMAS:g} sigma. Error and time above the bud
 ## Setting
 
 - Tracks: {"; ".join(f"{name} (from {_at(track)})" for name, track in TRACKS.items())}; the station
-  stands at (0.2, 2) m. Near tracks range from 6 to 42 m, far ones from 30 to 160 m.
+  stands at {_pair(RangeBearing().station)} m. Near tracks range from {_ranges("near")} m, far ones
+  from {_ranges("far")} m.
 - Noises: normal, uniform and lognormal, each with standard deviation {NOISE_SIGMA[0]} m and
   {NOISE_SIGMA[1]} rad and without bias (a bias is the same for every interval).
-- The filter: UKF, exact constant acceleration, default process noise, started at a draw from its own
-  P0 ({P0_SIGMA[0]} m, {P0_SIGMA[1]} m/s, {P0_SIGMA[2]} m/s^2). The true motion has no process noise:
-  Q is what a real vehicle needs.
+- The filter: UKF, exact constant acceleration, default process noise, started at a draw from
+  its own P0 ({P0_SIGMA[0]} m, {P0_SIGMA[1]} m/s, {P0_SIGMA[2]} m/s^2). The true motion has no
+  process noise: Q is what a real vehicle needs.
 - T_min = {MIN_S} s, T_max = {MAX_S} s for the covariance budget. The fixed interval is the budget's
   mean interval; the paper's law (preset figure3) gets the T_max at which its mean interval is that.
 - The law needs the desired track. A real vehicle is not exactly on it: here it circles around it by
@@ -347,8 +344,9 @@ has less time above in {len(against_fixed)} of {len(cases)}.
         )
     text += markdown.table(header, rows)
     text += f"""
-The standard error of a time above is {_range_of([100 * f.above_error for c in cases
-    for f in c.policies.values()])} %. The law's mean interval differs from the budget's by at most
+The standard error of a time above is {
+        _range_of([100 * f.above_error for c in cases for f in c.policies.values()])
+    } %. The law's mean interval differs from the budget's by at most
 {_worst_rate(cases):.1f} %.
 
 ## Why
@@ -358,9 +356,9 @@ evenly: too many close to the station, too few far from it and at the start, whe
 The gain is largest where the range changes most.
 
 *Far and straight.* The budget equalises the standard deviation. The RMSE is smallest somewhere
-between an equal interval and an equal standard deviation, because far from the station a sample buys
-less. Where the range grows steadily the budget pays with up to a few per cent of RMSE for keeping
-its promise in the last third of the track.
+between an equal interval and an equal standard deviation, because far from the station a sample
+buys less. Where the range grows steadily the budget pays with up to a few per cent of RMSE for
+keeping its promise in the last third of the track.
 
 *Lognormal noise.* P does not know that one measurement was an outlier; for normal noise that is
 right, since the error after an update is independent of the innovation. After an outlier of many
@@ -372,11 +370,25 @@ truth. The remedy inside the filter is a robust update, which keeps the outlier 
 *The law shown the truth* does better than the law in practice, for the same reason: comparing the
 estimated with the true displacement is a measurement of the error that no vehicle has.
 """
-    return text
+    return markdown.fill(text).rstrip() + "\n"
 
 
 def _at(track: Track) -> str:
-    return f"({track.position[0]:g}, {track.position[1]:g}) m"
+    return f"{_pair(track.position)} m"
+
+
+def _pair(values: tuple[float, float]) -> str:
+    return f"({values[0]:g}, {values[1]:g})"
+
+
+def _ranges(prefix: str) -> str:
+    """Give the shortest and the longest range of the tracks so called."""
+    ranges = []
+    for name, track in TRACKS.items():
+        if name.startswith(prefix):
+            for second in range(round(DURATION_S) + 1):
+                ranges.append(RangeBearing().h([*track.position_at(second), 0, 0, 0, 0])[0])
+    return f"{min(ranges):.0f} to {max(ranges):.0f}"
 
 
 def _range_of(values: list[float]) -> str:

@@ -69,6 +69,24 @@ class Track:
         period = as_number("wander_period_s", self.wander_period_s, "positive")
         object.__setattr__(self, "wander_period_s", period)
 
+    def position_at(self, time_s: float) -> tuple[float, float]:
+        """Give the true position (m) after one step of this many seconds."""
+        core = self._as_core()
+        core.advance(as_number("time_s", time_s, "not negative"))
+        x, y = core.position
+        return x, y
+
+    def _as_core(self) -> _core.Track:
+        return _core.Track(
+            self.kind,
+            self.position,
+            self.velocity,
+            self.acceleration,
+            self.turn_rate,
+            self.wander_m,
+            self.wander_period_s,
+        )
+
 
 @dataclass(frozen=True, kw_only=True)
 class Noise:
@@ -351,15 +369,7 @@ def _join(parts: dict[int, dict[str, npt.NDArray[Any]]], scenario: Scenario) -> 
 def _as_core(scenario: Scenario, first: int, count: int) -> _ScenarioDict:
     track, noise = scenario.track, scenario.noise
     return {
-        "track": _core.Track(
-            track.kind,
-            track.position,
-            track.velocity,
-            track.acceleration,
-            track.turn_rate,
-            track.wander_m,
-            track.wander_period_s,
-        ),
+        "track": track._as_core(),
         "noise": _core.SensorNoise(
             noise.kind, noise.range_m, noise.bearing_rad, noise.centred, noise.dropout
         ),

@@ -63,7 +63,7 @@ TEST_CASE("partial Cholesky: a lost pivot is floored, a bad diagonal refused") {
   Matrix<float, 2, 2> p;
   p << 1, 1, 1, 1;  // singular: the second pivot is 0
   REQUIRE(auvest::math::partial_cholesky<2>(p));
-  CHECK(p(1, 1) == doctest::Approx(std::sqrt(4 * std::numeric_limits<float>::epsilon())));
+  CHECK(p(1, 1) == doctest::Approx(std::sqrt(4.0 * double(std::numeric_limits<float>::epsilon()))));
   for (const float bad : {0.0f, -1.0f, std::nanf("")}) {
     Matrix<float, 2, 2> q;
     q << 1, 0, 0, bad;

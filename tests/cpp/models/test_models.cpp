@@ -147,14 +147,6 @@ auvest::RangeBearing<double, 6> sonar() {
 
 using View = auvest::RangeBearing<double, 6>::View;
 
-View empty_view() {
-  View view;
-  view.innovation.setZero();
-  view.H.setZero();
-  view.R.setZero();
-  return view;
-}
-
 TEST_CASE("process models") {
   check_process(auvest::EulerAcceleration<double>(), 0.5);
   check_process(auvest::ExactAcceleration<double>(), 0.5);
@@ -247,7 +239,7 @@ TEST_CASE("range and bearing: closed second differences against long double") {
     model.about(x).deviations(e, sum, difference);
 
     // Second-order Taylor terms, right to 1e-14 relative at |e| / |D| of 1e-7.
-    const double dx = x(0), dy = x(1), ex = e(0), ey = e(1);
+    const double dx = double(x(0)), dy = double(x(1)), ex = double(e(0)), ey = double(e(1));
     const double r = std::hypot(dx, dy);
     const double along = (dx * ex + dy * ey) / r;
     const double across = (dx * ey - dy * ex) / r;
@@ -296,7 +288,7 @@ TEST_CASE("range and bearing: the near field begins where the belief reaches the
   belief.x(1) = 2;
   belief.P.setIdentity();
   const Vector<double, 2> z(1.1, 0.4);
-  View view = empty_view();
+  View view;
   belief.P(0, 0) = belief.P(1, 1) = 0.99 / 50;  // sqrt(P_xx + P_yy) = 0.9949 m / 5
   CHECK_FALSE(model.near_field(belief, z, view));
   belief.P(0, 0) = belief.P(1, 1) = 1.01 / 50;
@@ -326,7 +318,7 @@ TEST_CASE("range and bearing: covariance of the position form, by Monte Carlo") 
     belief.x.setZero();
     belief.x(0) = 2;
     belief.P.setIdentity();
-    View view = empty_view();
+    View view;
     REQUIRE(model.near_field(belief, z, view));
     const double c = std::cos(z(1)), s = std::sin(z(1));
     const double u = c * view.innovation(0) + s * view.innovation(1);

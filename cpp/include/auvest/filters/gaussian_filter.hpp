@@ -60,9 +60,8 @@ class GaussianFilter {
     if (!initialised_) return Status::kNotInitialised;
     if (!math::is_finite(dt)) return Status::kNotFinite;
     if (dt < Scalar(0)) return Status::kTimeBackwards;
-    BeliefType next = belief_;
-    const Status status = derived().predict_belief(next, dt);
-    return status == Status::kOk ? commit(next) : status;
+    const BeliefType before = belief_;
+    return keep(derived().predict_belief(belief_, dt), before);
   }
 
   /// Corrects the belief by the measurement z of a sensor described by `model`.
@@ -113,41 +112,48 @@ class GaussianFilter {
   template <class Model>
   AUVEST_INLINE Status correct(const typename Model::Measurement& z, const Model& model,
                                Correction<Scalar, Model::kSize>& correction) {
-    constexpr int kSize = Model::kSize;
-    constexpr int kObserved = Model::kObserved;
     if (!initialised_) return Status::kNotInitialised;
     if (!math::all_finite(z)) return Status::kNotFinite;
 
-    BeliefType next = belief_;
-    if (!math::partial_cholesky<kObserved>(next.P)) return Status::kNotPositiveDefinite;
+    const BeliefType before = belief_;
+    return keep(correct_belief(z, model, correction), before);
+  }
 
+  template <class Model>
+  AUVEST_INLINE Status correct_belief(const typename Model::Measurement& z, const Model& model,
+                                      Correction<Scalar, Model::kSize>& correction) {
+    constexpr int kSize = Model::kSize;
+    constexpr int kObserved = Model::kObserved;
     Matrix<Scalar, kObserved, kSize> a;
     Matrix<Scalar, kSize, kSize> noise;
     typename Model::View view;
     correction.near_field = model.near_field(belief_, z, view);
+    if (!math::partial_cholesky<kObserved>(belief_.P)) return Status::kNotPositiveDefinite;
     if (correction.near_field) {
       correction.innovation = view.innovation;
-      project(view.H, next.P, a);
+      project(view.H, belief_.P, a);
       noise = view.R;
     } else {
       const Status status =
-          derived().describe(model, next.x, next.P, z, correction.innovation, a, noise);
+          derived().describe(model, belief_.x, belief_.P, z, correction.innovation, a, noise);
       if (status != Status::kOk) return status;
     }
-    const Status status = square_root_update<kSize>(next, a, noise, correction);
+    const Status status = square_root_update<kSize>(belief_, a, noise, correction);
     if (status != Status::kOk) return status;
-    return math::is_finite(correction.nis) ? commit(next) : Status::kOverflow;
+    return math::is_finite(correction.nis) ? Status::kOk : Status::kOverflow;
   }
 
-  Status commit(const BeliefType& next) {
+  /// Keeps the new belief if the operation that made it went well and it is finite; takes back
+  /// `before` otherwise. (A copy that nobody waits for costs less than one at the end would.)
+  AUVEST_INLINE Status keep(Status status, const BeliefType& before) {
     bool finite = true;
     AUVEST_UNROLL
     for (int i = 0; i < kStates; ++i) {
-      finite = finite && math::is_finite(next.x(i)) && math::is_finite(next.P(i, i));
+      finite = finite && math::is_finite(belief_.x(i)) && math::is_finite(belief_.P(i, i));
     }
-    if (!finite) return Status::kOverflow;
-    belief_ = next;
-    return Status::kOk;
+    if (status == Status::kOk && !finite) status = Status::kOverflow;
+    if (status != Status::kOk) belief_ = before;
+    return status;
   }
 
   Process process_;

@@ -31,6 +31,12 @@ struct LinearView {
   Vector<Scalar, M> innovation;
   Matrix<Scalar, M, Observed> H;
   Matrix<Scalar, M, M> R;
+
+  LinearView() {
+    innovation.setZero();
+    H.setZero();
+    R.setZero();
+  }
 };
 
 template <class Derived, class Scalar_, int N, int M, int Observed = N>
