@@ -33,6 +33,13 @@ struct CoordinatedTurn : auvest::ProcessModel<CoordinatedTurn<Scalar_>, Scalar_,
     return next;
   }
 
+  // f wraps the heading, so differences of headings are wrapped too.
+  State residual(const State& a, const State& b) const {
+    State difference = a - b;
+    difference(2) = auvest::math::wrap(difference(2));
+    return difference;
+  }
+
   Covariance Q(Scalar dt) const {
     Covariance q = Covariance::Zero();
     q(0, 0) = q(1, 1) = Scalar(1e-6) * dt;
@@ -82,7 +89,7 @@ int main() {
   CoordinatedTurn<double> vehicle;
   Vector<double, 5> truth;
   truth << 0, 0, 0, 1, 0.05;
-  for (int k = 1; k <= 120; ++k) {
+  for (int k = 1; k <= 600; ++k) {
     truth = vehicle.f(truth, 0.5);
     if (filter.predict(0.5) != auvest::Status::kOk) return 1;
     const BeaconRange<double>& beacon = beacons[k % 2];  // the beacons answer in turn
@@ -95,7 +102,9 @@ int main() {
     }
   }
   const double error = std::hypot(filter.x()(0) - truth(0), filter.x()(1) - truth(1));
-  std::printf("position error after 60 s: %.2f m, turn rate %.3f rad/s (true 0.050)\n", error,
-              filter.x()(4));
+  std::printf(
+      "position error after 300 s, two turns and a half: %.2f m, turn rate %.3f rad/s (true "
+      "0.050)\n",
+      error, filter.x()(4));
   return error < 0.5 ? 0 : 1;
 }

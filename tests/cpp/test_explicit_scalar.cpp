@@ -48,6 +48,62 @@ struct Tracker {
   }
 };
 
+/// The generic paths: deviations by subtraction, a nonlinear process, linear models, restore.
+template <class Scalar>
+struct Drift : auvest::ProcessModel<Drift<Scalar>, Scalar, 2> {
+  using State = auvest::Vector<Scalar, 2>;
+  using Covariance = auvest::Matrix<Scalar, 2, 2>;
+  State f(const State& x, Scalar dt) const {
+    State next;
+    next(0) = x(0) + dt * x(1) * x(1);
+    next(1) = x(1);
+    return next;
+  }
+  Covariance Q(Scalar dt) const {
+    Covariance q;
+    q(0, 0) = q(1, 1) = dt;
+    q(1, 0) = q(0, 1) = Scalar(0);
+    return q;
+  }
+};
+
+template <class Scalar>
+auvest::Vector<Scalar, 2> run_generic() {
+  auvest::Vector<Scalar, 2> x;
+  auvest::Matrix<Scalar, 2, 2> p;
+  auvest::Matrix<Scalar, 1, 2> h;
+  auvest::Matrix<Scalar, 1, 1> r;
+  x(0) = Scalar(1);
+  x(1) = Scalar(2);
+  p(0, 0) = p(1, 1) = Scalar(1);
+  p(1, 0) = p(0, 1) = Scalar(0.5);
+  h(0, 0) = h(0, 1) = Scalar(1);
+  r(0, 0) = Scalar(0.25);
+  const auvest::LinearMeasurement<Scalar, 2, 1> sensor(h, r);
+  auvest::Vector<Scalar, 1> z;
+  z(0) = Scalar(4);
+  auvest::Ukf<Drift<Scalar>> filter{Drift<Scalar>()};
+  REQUIRE(filter.reset(x, p) == auvest::Status::kOk);
+  REQUIRE(filter.predict(Scalar(0.5)) == auvest::Status::kOk);
+  REQUIRE(filter.update(z, sensor).status == auvest::Status::kOk);
+  REQUIRE(filter.restore(filter.belief()) == auvest::Status::kOk);
+
+  using Linear = auvest::LinearProcess<Scalar, 2>;
+  using Policy = auvest::FixedInterval<Scalar>;
+  auvest::AdaptiveInterval<auvest::Ekf<Linear>, Policy> ekf{auvest::Ekf<Linear>(Linear(p, p))};
+  REQUIRE(ekf.reset(filter.x(), filter.P()) == auvest::Status::kOk);
+  REQUIRE(ekf.predict(ekf.interval()) == auvest::Status::kOk);
+  REQUIRE(ekf.update(z, sensor).status == auvest::Status::kOk);
+  REQUIRE(ekf.feedback(ekf.x()) == auvest::Status::kOk);
+  return ekf.x();
+}
+
+TEST_CASE("explicit scalar: the generic paths too") {
+  const auto a = run_generic<ExplicitDouble>();
+  const auto b = run_generic<double>();
+  for (int i = 0; i < 2; ++i) CHECK(double(a(i)) == b(i));
+}
+
 TEST_CASE("explicit scalar: same bits as double") {
   const auto a = Tracker<ExplicitDouble>::aukf();
   const auto b = Tracker<double>::aukf();

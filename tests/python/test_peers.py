@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from filter_support import measure
+from filterpy import kalman
 
 import auvest
-
-kalman = pytest.importorskip("filterpy.kalman")
 
 SENSOR = auvest.RangeBearing(station=(10.0, -20.0), sigma_range_m=1.0, sigma_bearing_rad=0.05)
 

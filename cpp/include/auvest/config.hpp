@@ -4,17 +4,18 @@
 // IEEE 754 semantics, so a build that gives them up is refused here, at compile time.
 #pragma once
 
-#if defined(__FAST_MATH__)
+#if defined(__FAST_MATH__) || defined(__ASSOCIATIVE_MATH__) || defined(__RECIPROCAL_MATH__) || \
+    (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0)
 #error \
-    "auvest: -ffast-math (also part of -Ofast) reorders and approximates float arithmetic. \
+    "auvest: -ffast-math (also part of -Ofast) and its parts reorder and approximate float arithmetic. \
 Compile without it; add -ffp-contract=off."
 #endif
 
 #include <cfloat>
 
-#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD > 0
+#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0
 #error \
-    "auvest: this target evaluates float in a wider type (FLT_EVAL_METHOD > 0), as the x87 unit \
+    "auvest: this target evaluates float in a wider type (FLT_EVAL_METHOD is not 0), as the x87 unit \
 does. Compile with -msse2 -mfpmath=sse."
 #endif
 

@@ -23,7 +23,7 @@ Examples:
 
   auvest reproduce aukf
 
-  auvest reproduce aukf --runs 40 --output /tmp/aukf
+  auvest reproduce aukf --runs 40 --output results
 
   auvest reproduce aukf --json --quiet | jq .figure3.interval_s
 

@@ -1,5 +1,7 @@
 #include <doctest/doctest.h>
 
+#include "close.hpp"
+
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
@@ -64,8 +66,7 @@ void check_against_textbook() {
     }
     CHECK((correction.S - s).cwiseAbs().maxCoeff() < 1e-12 * s.trace());
     CHECK(correction.nis ==
-          doctest::Approx(correction.innovation.dot(s.inverse() * correction.innovation))
-              .epsilon(1e-9));
+          close_to(correction.innovation.dot(s.inverse() * correction.innovation), 1e-9));
   }
 }
 
@@ -94,10 +95,10 @@ TEST_CASE("square-root update: float stays positive where P - K S K' does not") 
   // Closed form: P_00 = R to 1e-12, P_11 = P_11 - P_10^2 / P_00 = 1e6 - 9.801e5 = 19900.
   CHECK(belief.P(0, 0) > 0);
   CHECK(belief.P(0, 0) < 1e-2f);
-  CHECK(belief.P(1, 1) == doctest::Approx(19900).epsilon(1e-3));
+  CHECK(belief.P(1, 1) == close_to(19900, 1e-3));
   CHECK(belief.P(0, 0) * belief.P(1, 1) >= belief.P(1, 0) * belief.P(1, 0));
-  CHECK(belief.x(0) == doctest::Approx(5));
-  CHECK(belief.x(1) == doctest::Approx(5 * 0.99));
+  CHECK(belief.x(0) == close_to(5, 1e-12));
+  CHECK(belief.x(1) == close_to(5 * 0.99, 1e-6));
 }
 
 TEST_CASE("square-root update: an indefinite noise is refused") {
@@ -112,6 +113,14 @@ TEST_CASE("square-root update: an indefinite noise is refused") {
     CHECK(auvest::square_root_update<1>(belief, a, noise, correction) ==
           Status::kNotPositiveDefinite);
   }
+  Belief<double, 2> pair;
+  pair.x.setZero();
+  pair.P.setIdentity();
+  Matrix<double, 2, 2> indefinite;
+  indefinite << 1, 2, 2, 1;
+  Correction<double, 2> correction(Status::kOk);
+  CHECK(auvest::square_root_update<2>(pair, Matrix<double, 2, 2>::Zero().eval(), indefinite,
+                                      correction) == Status::kNotPositiveDefinite);
 }
 
 }  // namespace

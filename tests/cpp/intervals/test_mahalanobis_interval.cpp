@@ -1,5 +1,7 @@
 #include <doctest/doctest.h>
 
+#include "close.hpp"
+
 #include <Eigen/LU>
 #include <cmath>
 
@@ -37,7 +39,7 @@ TEST_CASE("Eqs. (9) to (11): against Eigen on random points") {
     for (const auto& point : p) s += (point - mean) * (point - mean).transpose() / 3;
     const Position v = p[2] - mean;
     const double expected = v.dot(s.inverse() * v);
-    CHECK(squared_distance(p[0], p[1], p[2], p[3]) == doctest::Approx(expected).epsilon(1e-9));
+    CHECK(squared_distance(p[0], p[1], p[2], p[3]) == close_to(expected, 1e-9));
     CHECK(squared_distance(p[0], p[1], p[2], p[3]) < 2.25 + 1e-12);  // (N - 1)^2 / N for N = 4
   }
 }
@@ -49,8 +51,26 @@ TEST_CASE("finding 4: a constant error gives d^2 = 1.5, whatever its size") {
     const Position offset(0.6 * e, 0.8 * e);
     // At 1000 km the ridge, 2e-16 of the trace, begins to be felt in the narrow direction.
     CHECK(squared_distance(r0 + offset, r0, r1 + offset, r1) ==
-          doctest::Approx(1.5).epsilon(e == 1e6 ? 0.02 : 1e-4));
+          close_to(1.5, e == 1e6 ? 0.02 : 1e-4));
   }
+}
+
+TEST_CASE("in float the ridge begins at a thousandth of the step") {
+  auvest::MahalanobisInterval<float> law;
+  struct FloatEstimate {
+    Vector<float, 2> position;
+    const Vector<float, 2>& x() const { return position; }
+  };
+  for (const float e : {3e-3f, 0.1f, 10.0f, 100.0f}) {
+    const Vector<float, 2> r0(0, 0), r1(0.3f, 0), offset(0, e);
+    law.restart(r0 + offset, r0);
+    law.next(FloatEstimate{r1 + offset}, r1);
+    CHECK(double(law.memory.mahalanobis_squared) == close_to(1.5, 0.01));
+  }
+  // Far below the smallest step that matters, the points count as one.
+  law.restart(Vector<float, 2>(0, 0), Vector<float, 2>(0, 0));
+  law.next(FloatEstimate{Vector<float, 2>(1e-32f, 0)}, Vector<float, 2>(0, 1e-32f));
+  CHECK(law.memory.mahalanobis_squared == 0);
 }
 
 TEST_CASE("d^2 sees the growth of an error, not its size") {
@@ -58,8 +78,7 @@ TEST_CASE("d^2 sees the growth of an error, not its size") {
   for (const double e : {1e-3, 1.0, 1e3}) {
     for (const double g : {-1.0, 0.0, 0.5, 1.0, 2.0, 10.0}) {
       CHECK(squared_distance(Position(0, e), Position(0, 0), Position(0.3, g * e),
-                             Position(0.3, 0)) ==
-            doctest::Approx(0.75 + 1.5 * g * g / (1 + g * g)).epsilon(1e-6));
+                             Position(0.3, 0)) == close_to(0.75 + 1.5 * g * g / (1 + g * g), 1e-6));
     }
   }
 }
@@ -67,12 +86,12 @@ TEST_CASE("d^2 sees the growth of an error, not its size") {
 TEST_CASE("collinear points: distance along the line; coincident points: zero") {
   // On a line the sample variance alone counts: points 0, 0, 1, 1 have d^2 = 0.25 / (1/3) = 0.75.
   CHECK(squared_distance(Position(0, 0), Position(0, 0), Position(3, 4), Position(3, 4)) ==
-        doctest::Approx(0.75).epsilon(1e-5));
+        close_to(0.75, 1e-5));
   CHECK(squared_distance(Position(5, 5), Position(5, 5), Position(5, 5), Position(5, 5)) == 0);
   // Far from the origin the coordinates' rounding spans a plane; it must not count.
   const Position far(1e5, -3e5);
   CHECK(squared_distance(far, far, far + Position(0.3, 0.4), far + Position(0.3, 0.4)) ==
-        doctest::Approx(0.75).epsilon(1e-3));
+        close_to(0.75, 1e-3));
 }
 
 TEST_CASE("Eqs. (7), (8), (12): one step by hand") {
@@ -82,9 +101,9 @@ TEST_CASE("Eqs. (7), (8), (12): one step by hand") {
   law.restart(Position(0, 0), Position(0, 0));
   // d_t^2 = 0.01, d_e^2 = 0.04: M = 0.01 / 0.29.
   const double t = law.next(Estimate{Position(0.2, 0)}, Position(0, 0.1));
-  CHECK(law.memory.ratio == doctest::Approx(0.01 / 0.29).epsilon(1e-14));
-  CHECK(t == doctest::Approx(0.5 * 0.1 * 0.5 + 0.5 * (0.01 / 0.29)).epsilon(1e-14));
-  CHECK(law.memory.tau == doctest::Approx(1.6 / (law.memory.mahalanobis_squared + 1)));
+  CHECK(law.memory.ratio == close_to(0.01 / 0.29, 1e-14));
+  CHECK(t == close_to(0.5 * 0.1 * 0.5 + 0.5 * (0.01 / 0.29), 1e-14));
+  CHECK(law.memory.tau == close_to(1.6 / (law.memory.mahalanobis_squared + 1), 1e-12));
 }
 
 TEST_CASE("figure3: the steady interval is the fixed point at d^2 = 1.5, M = 0.9") {
@@ -98,7 +117,7 @@ TEST_CASE("figure3: the steady interval is the fixed point at d^2 = 1.5, M = 0.9
     r += Position(0.1, 0.2);
     t = law.next(Estimate{r + offset}, r);
   }
-  CHECK(t == doctest::Approx(0.576 / 0.964).epsilon(1e-6));
+  CHECK(t == close_to(0.576 / 0.964, 1e-6));
 }
 
 TEST_CASE("table1: tau is at most eps / gamma2, so T falls to T_min (finding 1)") {

@@ -1,5 +1,7 @@
 #include <doctest/doctest.h>
 
+#include "close.hpp"
+
 #include <Eigen/Cholesky>
 
 #include "auvest/math/linear_algebra.hpp"
@@ -55,7 +57,7 @@ TEST_CASE("partial Cholesky: the full factor is Eigen's") {
   REQUIRE(auvest::math::partial_cholesky<6>(a));
   const Eigen::Matrix<double, 6, 6> expected = Eigen::Matrix<double, 6, 6>(p).llt().matrixL();
   for (int i = 0; i < 6; ++i) {
-    for (int j = 0; j <= i; ++j) CHECK(a(i, j) == doctest::Approx(expected(i, j)).epsilon(1e-13));
+    for (int j = 0; j <= i; ++j) CHECK(a(i, j) == close_to(expected(i, j), 1e-13));
   }
 }
 
@@ -63,7 +65,7 @@ TEST_CASE("partial Cholesky: a lost pivot is floored, a bad diagonal refused") {
   Matrix<float, 2, 2> p;
   p << 1, 1, 1, 1;  // singular: the second pivot is 0
   REQUIRE(auvest::math::partial_cholesky<2>(p));
-  CHECK(p(1, 1) == doctest::Approx(std::sqrt(4.0 * double(std::numeric_limits<float>::epsilon()))));
+  CHECK(p(1, 1) == close_to(std::sqrt(4.0 * double(std::numeric_limits<float>::epsilon())), 1e-7));
   for (const float bad : {0.0f, -1.0f, std::nanf("")}) {
     Matrix<float, 2, 2> q;
     q << 1, 0, 0, bad;
@@ -91,6 +93,18 @@ TEST_CASE("LDL': gives the matrix back, floors and refuses as the Cholesky facto
   CHECK(singular(1, 1) == 4 * std::numeric_limits<float>::epsilon());
   singular(1, 1) = -1;
   CHECK_FALSE(auvest::math::ldlt(singular));
+  Matrix<double, 2, 2> indefinite;
+  indefinite << 1, 2, 2, 1;  // eigenvalues 3 and -1, positive diagonal
+  CHECK_FALSE(auvest::math::ldlt(indefinite));
+}
+
+TEST_CASE("lower_finite: looks at the lower triangle and only there") {
+  Matrix<double, 3, 3> a = Matrix<double, 3, 3>::Zero();
+  a(0, 2) = std::nan("");
+  CHECK(auvest::math::lower_finite(a));
+  CHECK_FALSE(auvest::math::all_finite(a));
+  a(2, 0) = std::numeric_limits<double>::infinity();
+  CHECK_FALSE(auvest::math::lower_finite(a));
 }
 
 TEST_CASE("positive definite: against the smallest eigenvalue's sign") {

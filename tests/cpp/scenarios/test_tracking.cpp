@@ -1,5 +1,7 @@
 #include <doctest/doctest.h>
 
+#include "close.hpp"
+
 #include <cmath>
 #include <vector>
 
@@ -21,8 +23,8 @@ using Process = auvest::EulerAcceleration<double>;
 TEST_CASE("track: Euler is Eq. (4), straight and turn do not depend on the step") {
   Track euler;
   euler.advance(0.5);
-  CHECK(euler.position[0] == doctest::Approx(0.2 + 0.05));
-  CHECK(euler.velocity[1] == doctest::Approx(0.2 + 0.01));
+  CHECK(euler.position[0] == close_to(0.2 + 0.05, 1e-12));
+  CHECK(euler.velocity[1] == close_to(0.2 + 0.01, 1e-12));
   for (const auto kind : {Track::Kind::kStraight, Track::Kind::kTurn}) {
     Track once;
     once.kind = kind;
@@ -31,8 +33,8 @@ TEST_CASE("track: Euler is Eq. (4), straight and turn do not depend on the step"
     once.advance(2);
     for (int k = 0; k < 200; ++k) often.advance(0.01);
     for (int i = 0; i < 2; ++i) {
-      CHECK(often.position[i] == doctest::Approx(once.position[i]).epsilon(1e-12));
-      CHECK(often.velocity[i] == doctest::Approx(once.velocity[i]).epsilon(1e-12));
+      CHECK(often.position[i] == close_to(once.position[i], 1e-12));
+      CHECK(often.velocity[i] == close_to(once.velocity[i], 1e-12));
     }
   }
   // A full circle ends where it began; its diameter is 2 v / rate.
@@ -42,9 +44,9 @@ TEST_CASE("track: Euler is Eq. (4), straight and turn do not depend on the step"
   const double half_turn = auvest::math::pi<double>() / 0.5;
   circle.advance(half_turn);
   CHECK(std::hypot(circle.position[0] - 0.2, circle.position[1] - 2) ==
-        doctest::Approx(2 * std::hypot(0.1, 0.2) / 0.5).epsilon(1e-12));
+        close_to(2 * std::hypot(0.1, 0.2) / 0.5, 1e-12));
   circle.advance(half_turn);
-  CHECK(circle.position[0] == doctest::Approx(0.2).epsilon(1e-12));
+  CHECK(circle.position[0] == close_to(0.2, 1e-12));
 }
 
 TEST_CASE("noise: mean and standard deviation of the three kinds") {
@@ -74,8 +76,7 @@ TEST_CASE("noise: mean and standard deviation of the three kinds") {
       const double expected = scale * SensorNoise::standard_deviation(kind);
       // Four standard errors of the mean; 5 % for the lognormal's heavy-tailed variance, 1 % else.
       CHECK(std::fabs(mean - scale * SensorNoise::mean(kind)) < 4 * expected / std::sqrt(1.0 * n));
-      CHECK(sigma ==
-            doctest::Approx(expected).epsilon(kind == SensorNoise::Kind::kLognormal ? 0.05 : 0.01));
+      CHECK(sigma == close_to(expected, kind == SensorNoise::Kind::kLognormal ? 0.05 : 0.01));
     }
   }
 }
@@ -136,7 +137,7 @@ TEST_CASE("loop: the duration ends it, probes stand at even times, dropouts are 
   // Truth and prediction are both Eq. (4) from the same start: no error at all without updates.
   Track truth;
   for (int k = 0; k < 10; ++k) truth.advance(0.5);
-  CHECK(silent.x.back() == doctest::Approx(truth.position[0]).epsilon(1e-14));
+  CHECK(silent.x.back() == close_to(truth.position[0], 1e-14));
 }
 
 TEST_CASE("loop: a failure is returned, the steps before it are kept") {

@@ -25,6 +25,7 @@ class AdaptiveInterval : public Filter {
   /// Sets the belief and starts the policy; `reference` is the desired position (m) at step 0.
   Status reset(const State& x0, const Covariance& P0, const Position& reference) {
     if (!math::all_finite(reference)) return Status::kNotFinite;
+    if (policy_.check() != Status::kOk) return Status::kBadParameter;
     const Status status = Filter::reset(x0, P0);
     if (status != Status::kOk) return status;
     Position estimate;
@@ -46,6 +47,7 @@ class AdaptiveInterval : public Filter {
   /// Takes back what belief(), policy() and interval() gave: the same bits go on.
   Status restore(const BeliefType& belief, const Policy& policy, Scalar interval) {
     if (!math::is_finite(interval)) return Status::kNotFinite;
+    if (!(interval > Scalar(0)) || policy.check() != Status::kOk) return Status::kBadParameter;
     const Status status = Filter::restore(belief);
     if (status != Status::kOk) return status;
     policy_ = policy;

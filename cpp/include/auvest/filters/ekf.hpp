@@ -17,16 +17,19 @@ class Ekf : public GaussianFilter<Ekf<Process>, Process> {
 
   explicit Ekf(const Process& process) : Base(process) {}
 
+  /// kBadParameter if a parameter of the process is out of range.
+  Status check() const { return this->process().check(); }
+
   Status predict_belief(BeliefType& belief, Scalar dt) const {
     this->process().propagate(belief, dt);
     return Status::kOk;
   }
 
   template <class Model>
-  Status describe(const Model& model, const State& x, const Covariance& factor,
-                  const typename Model::Measurement& z, typename Model::Measurement& innovation,
-                  Matrix<Scalar, Model::kObserved, Model::kSize>& a,
-                  typename Model::Noise& noise) const {
+  Status linearise(const Model& model, const State& x, const Covariance& factor,
+                   const typename Model::Measurement& z, typename Model::Measurement& innovation,
+                   Matrix<Scalar, Model::kObserved, Model::kSize>& a,
+                   typename Model::Noise& noise) const {
     const auto point = model.about(x);
     innovation = model.residual(z, point.value());
     Base::project(point.H(), factor, a);

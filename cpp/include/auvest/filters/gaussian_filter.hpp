@@ -3,9 +3,11 @@
 //
 // A filter derives from GaussianFilter<Itself, Process> and offers
 //
+//     Status check()
+//         kOk, or kBadParameter if a parameter of the process or the filter is out of range
 //     Status predict_belief(belief, dt)
 //         belief after dt seconds
-//     Status describe(model, x, factor, z, innovation, A, E)
+//     Status linearise(model, x, factor, z, innovation, A, E)
 //         the measurement in the coordinates of the factor L of P (see square_root_update.hpp)
 #pragma once
 
@@ -33,7 +35,9 @@ class GaussianFilter {
 
   /// Sets the belief. Only the lower triangle of P0 is read.
   Status reset(const State& x0, const Covariance& P0) {
-    if (!math::all_finite(x0) || !math::all_finite(P0)) return Status::kNotFinite;
+    const Status status = derived().check();
+    if (status != Status::kOk) return status;
+    if (!math::all_finite(x0) || !math::lower_finite(P0)) return Status::kNotFinite;
     if (!math::is_positive_definite(P0)) return Status::kNotPositiveDefinite;
     belief_.x = x0;
     belief_.P = P0;
@@ -43,13 +47,9 @@ class GaussianFilter {
 
   /// Takes back a belief saved from belief(): the same bits go on.
   Status restore(const BeliefType& saved) {
-    for (int i = 0; i < kStates; ++i) {
-      if (!math::is_finite(saved.x(i))) return Status::kNotFinite;
-      for (int j = 0; j <= i; ++j) {
-        if (!math::is_finite(saved.P(i, j))) return Status::kNotFinite;
-      }
-      if (!(saved.P(i, i) > Scalar(0))) return Status::kNotPositiveDefinite;
-    }
+    if (!math::all_finite(saved.x) || !math::lower_finite(saved.P)) return Status::kNotFinite;
+    Covariance p = saved.P;
+    if (!math::ldlt(p)) return Status::kNotPositiveDefinite;
     belief_ = saved;
     initialised_ = true;
     return Status::kOk;
@@ -61,7 +61,8 @@ class GaussianFilter {
     if (!math::is_finite(dt)) return Status::kNotFinite;
     if (dt < Scalar(0)) return Status::kTimeBackwards;
     const BeliefType before = belief_;
-    return keep(derived().predict_belief(belief_, dt), before);
+    const Status status = derived().predict_belief(belief_, dt);
+    return keep(status, math::all_finite(belief_.x) && math::lower_finite(belief_.P), before);
   }
 
   /// Corrects the belief by the measurement z of a sensor described by `model`.
@@ -116,7 +117,11 @@ class GaussianFilter {
     if (!math::all_finite(z)) return Status::kNotFinite;
 
     const BeliefType before = belief_;
-    return keep(correct_belief(z, model, correction), before);
+    const Status status = correct_belief(z, model, correction);
+    bool finite = math::all_finite(belief_.x);  // P is a square: finite if its diagonal is
+    AUVEST_UNROLL
+    for (int i = 0; i < kStates; ++i) finite = finite && math::is_finite(belief_.P(i, i));
+    return keep(status, finite, before);
   }
 
   template <class Model>
@@ -135,7 +140,7 @@ class GaussianFilter {
       noise = view.R;
     } else {
       const Status status =
-          derived().describe(model, belief_.x, belief_.P, z, correction.innovation, a, noise);
+          derived().linearise(model, belief_.x, belief_.P, z, correction.innovation, a, noise);
       if (status != Status::kOk) return status;
     }
     const Status status = square_root_update<kSize>(belief_, a, noise, correction);
@@ -145,12 +150,7 @@ class GaussianFilter {
 
   /// Keeps the new belief if the operation that made it went well and it is finite; takes back
   /// `before` otherwise. (A copy that nobody waits for costs less than one at the end would.)
-  AUVEST_INLINE Status keep(Status status, const BeliefType& before) {
-    bool finite = true;
-    AUVEST_UNROLL
-    for (int i = 0; i < kStates; ++i) {
-      finite = finite && math::is_finite(belief_.x(i)) && math::is_finite(belief_.P(i, i));
-    }
+  AUVEST_INLINE Status keep(Status status, bool finite, const BeliefType& before) {
     if (status == Status::kOk && !finite) status = Status::kOverflow;
     if (status != Status::kOk) belief_ = before;
     return status;

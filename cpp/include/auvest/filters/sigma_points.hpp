@@ -13,6 +13,7 @@
 
 #include "auvest/math/basic.hpp"
 #include "auvest/status.hpp"
+#include "auvest/types.hpp"
 
 namespace auvest {
 
@@ -21,7 +22,7 @@ struct SigmaPoints {
   struct Params {
     Scalar alpha = Scalar(1);   ///< spread of the points, 1e-8..1; Table 1: 1e-6
     Scalar beta = Scalar(2);    ///< prior knowledge, >= alpha^2; 2 is best for a Gaussian; Table 1
-    Scalar kappa = Scalar(-3);  ///< secondary scaling, n + kappa > 0; Table 1
+    Scalar kappa = Scalar(-3);  ///< secondary scaling, n + kappa > 0; Table 1, where n = 6
   };
 
   Scalar sqrt_c;       ///< sigma points lie at x +- sqrt_c L_i
@@ -47,6 +48,39 @@ struct SigmaPoints {
     // Subtraction leaves h(x+e) - h(x) with an error of one ulp of h, and the transform divides
     // its second differences by c: below c = sqrt(epsilon) fewer than half the digits are left.
     fine = c * c < math::machine_epsilon<Scalar>();
+  }
+
+  /// The transform about `point`, whose deviations depend on the first O states, with the first O
+  /// columns of the Cholesky factor of P. In: the additive noise covariance (lower triangle) in
+  /// `e`. Out: the rows t_i of `t`, the shift m of the mean, and e + sum s_i s_i' + (beta -
+  /// alpha^2) m m', so that P_yy = t' t + e and P_xy = L t.
+  template <class Point, int N, int O, int M>
+  AUVEST_INLINE void transform(const Point& point, const Matrix<Scalar, N, N>& factor,
+                               Matrix<Scalar, O, M>& t, Vector<Scalar, M>& shift,
+                               Matrix<Scalar, M, M>& e) const {
+    AUVEST_UNROLL
+    for (int k = 0; k < O; ++k) {
+      Vector<Scalar, O> step;
+      AUVEST_UNROLL
+      for (int i = 0; i < O; ++i) step(i) = i < k ? Scalar(0) : sqrt_c * factor(i, k);
+      Vector<Scalar, M> sum;
+      Vector<Scalar, M> difference;
+      point.deviations(step, sum, difference);
+      AUVEST_UNROLL
+      for (int m = 0; m < M; ++m) {
+        t(k, m) = half_sqrt_c * difference(m);  // t_k
+        sum(m) = half_sqrt_c * sum(m);          // s_k
+        shift(m) = k == 0 ? sum(m) : shift(m) + sum(m);
+        AUVEST_UNROLL
+        for (int l = 0; l <= m; ++l) e(m, l) = e(m, l) + sum(m) * sum(l);
+      }
+    }
+    AUVEST_UNROLL
+    for (int m = 0; m < M; ++m) {
+      shift(m) = mean_weight * shift(m);
+      AUVEST_UNROLL
+      for (int l = 0; l <= m; ++l) e(m, l) = e(m, l) + centre * shift(m) * shift(l);
+    }
   }
 };
 

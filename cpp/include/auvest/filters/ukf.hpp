@@ -23,7 +23,7 @@ class Ukf : public GaussianFilter<Ukf<Process>, Process> {
   using typename Base::State;
   using Params = typename SigmaPoints<Scalar>::Params;
 
-  explicit Ukf(const Process& process, const Params& params = Params())
+  explicit Ukf(const Process& process, const Params& params = default_params())
       : Base(process), points_(params, kStates) {}
 
   Status predict_belief(BeliefType& belief, Scalar dt) const {
@@ -31,53 +31,32 @@ class Ukf : public GaussianFilter<Ukf<Process>, Process> {
   }
 
   template <class Model>
-  Status describe(const Model& model, const State& x, const Covariance& factor,
-                  const typename Model::Measurement& z, typename Model::Measurement& innovation,
-                  Matrix<Scalar, Model::kObserved, Model::kSize>& a,
-                  typename Model::Noise& noise) const {
-    constexpr int kSize = Model::kSize;
-    constexpr int kObserved = Model::kObserved;
-    const Status status = allowed(Model::kClosedForm);
-    if (status != Status::kOk) return status;
-
+  Status linearise(const Model& model, const State& x, const Covariance& factor,
+                   const typename Model::Measurement& z, typename Model::Measurement& innovation,
+                   Matrix<Scalar, Model::kObserved, Model::kSize>& a,
+                   typename Model::Noise& noise) const {
+    if (points_.fine && !Model::kClosedForm) return Status::kAlphaTooSmall;
     const auto point = model.about(x);
-    typename Model::Measurement mean;
-    noise = model.R();
-    AUVEST_UNROLL
-    for (int k = 0; k < kObserved; ++k) {
-      typename Model::ObservedState e;
-      AUVEST_UNROLL
-      for (int i = 0; i < kObserved; ++i) {
-        e(i) = i < k ? Scalar(0) : points_.sqrt_c * factor(i, k);
-      }
-      typename Model::Measurement sum;
-      typename Model::Measurement difference;
-      point.deviations(e, sum, difference);
-      AUVEST_UNROLL
-      for (int m = 0; m < kSize; ++m) {
-        a(k, m) = points_.half_sqrt_c * difference(m);  // t_k
-        sum(m) = points_.half_sqrt_c * sum(m);          // s_k
-        mean(m) = k == 0 ? sum(m) : mean(m) + sum(m);
-        AUVEST_UNROLL
-        for (int l = 0; l <= m; ++l) noise(m, l) = noise(m, l) + sum(m) * sum(l);
-      }
-    }
     typename Model::Measurement predicted;
+    noise = model.R();
+    points_.transform(point, factor, a, predicted, noise);
     AUVEST_UNROLL
-    for (int m = 0; m < kSize; ++m) {
-      mean(m) = points_.mean_weight * mean(m);
-      predicted(m) = point.value()(m) + mean(m);
-      AUVEST_UNROLL
-      for (int l = 0; l <= m; ++l) {
-        noise(m, l) = noise(m, l) + points_.centre * mean(m) * mean(l);
-      }
-    }
+    for (int m = 0; m < Model::kSize; ++m) predicted(m) = point.value()(m) + predicted(m);
     innovation = model.residual(z, predicted);
     return Status::kOk;
   }
 
-  /// kBadParameter if alpha, beta or kappa is out of range.
-  Status check() const { return points_.status; }
+  /// kBadParameter if alpha, beta, kappa or a parameter of the process is out of range.
+  Status check() const {
+    return points_.status != Status::kOk ? points_.status : this->process().check();
+  }
+
+  /// Params() with kappa = 3 - n, which matches the fourth moments of a Gaussian.
+  static Params default_params() {
+    Params params;
+    params.kappa = Scalar(3 - kStates);
+    return params;
+  }
 
  private:
   template <bool>
@@ -89,44 +68,21 @@ class Ukf : public GaussianFilter<Ukf<Process>, Process> {
   }
 
   Status predict_belief(BeliefType& belief, Scalar dt, Linear<false>) const {
-    const Status status = allowed(Process::kClosedForm);
-    if (status != Status::kOk) return status;
+    if (points_.fine && !Process::kClosedForm) return Status::kAlphaTooSmall;
     Covariance factor = belief.P;
     if (!math::partial_cholesky<kStates>(factor)) return Status::kNotPositiveDefinite;
-
     const auto point = this->process().about(belief.x, dt);
-    State mean;
+    Covariance t;
+    State shift;
     belief.P = this->process().Q(dt);
-    for (int k = 0; k < kStates; ++k) {
-      State e;
-      for (int i = 0; i < kStates; ++i) {
-        e(i) = i < k ? Scalar(0) : points_.sqrt_c * factor(i, k);
-      }
-      State sum;
-      State difference;
-      point.deviations(e, sum, difference);
-      for (int i = 0; i < kStates; ++i) {
-        sum(i) = points_.half_sqrt_c * sum(i);
-        difference(i) = points_.half_sqrt_c * difference(i);
-        mean(i) = k == 0 ? sum(i) : mean(i) + sum(i);
-        for (int j = 0; j <= i; ++j) {
-          belief.P(i, j) = belief.P(i, j) + (sum(i) * sum(j) + difference(i) * difference(j));
-        }
-      }
-    }
+    points_.transform(point, factor, t, shift, belief.P);
     for (int i = 0; i < kStates; ++i) {
-      mean(i) = points_.mean_weight * mean(i);
-      belief.x(i) = point.value()(i) + mean(i);
+      belief.x(i) = point.value()(i) + shift(i);
       for (int j = 0; j <= i; ++j) {
-        belief.P(i, j) = belief.P(i, j) + points_.centre * mean(i) * mean(j);
+        for (int k = 0; k < kStates; ++k) belief.P(i, j) = belief.P(i, j) + t(k, i) * t(k, j);
       }
     }
     return Status::kOk;
-  }
-
-  Status allowed(bool closed_form) const {
-    if (points_.status != Status::kOk) return points_.status;
-    return points_.fine && !closed_form ? Status::kAlphaTooSmall : Status::kOk;
   }
 
   SigmaPoints<Scalar> points_;

@@ -4,6 +4,7 @@
 // Not in the paper. It needs no reference track, and it spends samples where uncertainty grows.
 #pragma once
 
+#include "auvest/intervals/interval_limits.hpp"
 #include "auvest/math/basic.hpp"
 #include "auvest/status.hpp"
 #include "auvest/types.hpp"
@@ -15,10 +16,7 @@ struct CovarianceBudget {
   using Scalar = Scalar_;
   using Position = Vector<Scalar, 2>;
 
-  struct Params {
-    Scalar initial_s = Scalar(0.5);         ///< T(0)
-    Scalar min_s = Scalar(0.02);            ///< T_min
-    Scalar max_s = Scalar(1);               ///< T_max, Table 1
+  struct Params : IntervalLimits<Scalar> {
     Scalar position_sigma_m = Scalar(0.1);  ///< budget for sqrt(P_xx + P_yy) before an update
   };
 
@@ -30,29 +28,28 @@ struct CovarianceBudget {
   void restart(const Position&, const Position&) {}
 
   /// Bisection on the predicted variance, ten halvings: T is right to 0.1 % of T_max - T_min and
-  /// never above the budget, unless T_min itself is.
+  /// never above the budget, unless T_min itself is. The variance is taken to grow with T, as it
+  /// does but for a belief whose velocity is correlated with minus its position.
   template <class Filter>
   Scalar next(const Filter& filter, const Position&) {
     const Scalar budget = params.position_sigma_m * params.position_sigma_m;
-    if (!(variance(filter, params.max_s) > budget)) return params.max_s;
+    if (variance(filter, params.max_s) <= budget) return params.max_s;
     Scalar low = params.min_s;
     Scalar high = params.max_s;
     for (int i = 0; i < 10; ++i) {
       const Scalar middle = Scalar(0.5) * (low + high);
-      if (variance(filter, middle) > budget) {
-        high = middle;
-      } else {
+      if (variance(filter, middle) <= budget) {
         low = middle;
+      } else {
+        high = middle;
       }
     }
     return low;
   }
 
   Status check() const {
-    const bool valid = math::is_finite(params.initial_s) && math::is_finite(params.min_s) &&
-                       math::is_finite(params.max_s) && math::is_finite(params.position_sigma_m) &&
-                       params.min_s > Scalar(0) && params.initial_s >= params.min_s &&
-                       params.max_s >= params.initial_s && params.position_sigma_m > Scalar(0);
+    const bool valid = params.valid() && math::is_finite(params.position_sigma_m) &&
+                       params.position_sigma_m > Scalar(0);
     return valid ? Status::kOk : Status::kBadParameter;
   }
 

@@ -5,6 +5,7 @@
 // literally, (7) and (8) are circular. What the law can and cannot do: docs/algorithms/aukf.md.
 #pragma once
 
+#include "auvest/intervals/interval_limits.hpp"
 #include "auvest/math/basic.hpp"
 #include "auvest/status.hpp"
 #include "auvest/types.hpp"
@@ -17,10 +18,7 @@ struct MahalanobisInterval {
   using Position = Vector<Scalar, 2>;
 
   /// The defaults are the preset figure3.
-  struct Params {
-    Scalar initial_s = Scalar(0.5);   ///< T(0), Table 1
-    Scalar min_s = Scalar(0.02);      ///< T_min, not stated in the paper
-    Scalar max_s = Scalar(1);         ///< T_max, Table 1
+  struct Params : IntervalLimits<Scalar> {
     Scalar tau0 = Scalar(0.5);        ///< tau(0), in (0, 1); the paper studies 0.1, 0.3, 0.5, 0.9
     Scalar scale = Scalar(0.1);       ///< phi of Eq. (8), Table 1
     Scalar epsilon = Scalar(1.6);     ///< eps of Eq. (12), Table 1
@@ -93,17 +91,15 @@ struct MahalanobisInterval {
 
   Status check() const {
     const Params& p = params;
-    const bool finite =
-        math::is_finite(p.initial_s) && math::is_finite(p.min_s) && math::is_finite(p.max_s) &&
-        math::is_finite(p.tau0) && math::is_finite(p.scale) && math::is_finite(p.epsilon) &&
-        math::is_finite(p.gamma1_m2) && math::is_finite(p.gamma2) && math::is_finite(p.ratio_max);
-    const bool interval = p.min_s > Scalar(0) && p.initial_s >= p.min_s && p.max_s >= p.initial_s;
+    const bool finite = math::is_finite(p.tau0) && math::is_finite(p.scale) &&
+                        math::is_finite(p.epsilon) && math::is_finite(p.gamma1_m2) &&
+                        math::is_finite(p.gamma2) && math::is_finite(p.ratio_max);
     const bool tau = p.tau_min > Scalar(0) && p.tau0 >= p.tau_min && p.tau_max >= p.tau0 &&
                      p.tau_max < Scalar(1);
     const bool law = !(p.scale < Scalar(0)) && !(p.scale > Scalar(1)) && p.epsilon > Scalar(0) &&
                      p.gamma1_m2 > Scalar(0) && p.gamma2 > Scalar(0) && p.ratio_max > Scalar(0) &&
                      !(p.ratio_max > Scalar(1));
-    return finite && interval && tau && law ? Status::kOk : Status::kBadParameter;
+    return finite && p.valid() && tau && law ? Status::kOk : Status::kBadParameter;
   }
 
  private:
@@ -135,30 +131,40 @@ struct MahalanobisInterval {
   ///
   /// sums of squares, in which nothing cancels. S is singular when the points are collinear, as at
   /// the start, where X(0) = R(0), and on noise-free straight legs: epsilon times its trace is
-  /// added to its diagonal, which gives the pseudo-inverse's distance along the line there and
-  /// changes nothing elsewhere. If all four points coincide, d^2 = 0.
+  /// added to its diagonal, which gives the pseudo-inverse's distance along the line there. It is
+  /// felt where the points are closer to a line than some sqrt(epsilon) of their spread (1e-3 in
+  /// float), and nowhere else. If all four points coincide, d^2 = 0.
   Scalar squared_distance(const Position& estimate, const Position& reference) const {
     const Position* points[4] = {&estimate, &reference, &memory.last_estimate,
                                  &memory.last_reference};  // Eq. (9)
     Scalar v[4][2];
-    Scalar trace = Scalar(0);
+    Scalar largest = Scalar(0);
     for (int axis = 0; axis < 2; ++axis) {
       const Scalar mean = Scalar(0.25) * (((*points[0])(axis) + (*points[1])(axis)) +
                                           ((*points[2])(axis) + (*points[3])(axis)));  // Eq. (10)
       for (int i = 0; i < 4; ++i) {
         v[i][axis] = (*points[i])(axis)-mean;
+        const Scalar size = v[i][axis] < Scalar(0) ? -v[i][axis] : v[i][axis];
+        if (size > largest) largest = size;
+      }
+    }
+    if (!(largest > Scalar(1e-30))) return Scalar(0);
+
+    // d^2 does not change with the unit of length: take the largest component, against overflow.
+    const Scalar inverse = Scalar(1) / largest;
+    Scalar trace = Scalar(0);
+    for (int i = 0; i < 4; ++i) {
+      for (int axis = 0; axis < 2; ++axis) {
+        v[i][axis] = v[i][axis] * inverse;
         trace = trace + v[i][axis] * v[i][axis];
       }
     }
-    if (!(trace > Scalar(0))) return Scalar(0);
-
-    const Scalar inverse = Scalar(1) / trace;
-    const Scalar ridge = math::machine_epsilon<Scalar>();
-    Scalar form = ridge * ((v[0][0] * v[0][0] + v[0][1] * v[0][1]) * inverse);
-    Scalar determinant = ridge;
+    const Scalar ridge = math::machine_epsilon<Scalar>() * trace;
+    Scalar form = ridge * (v[0][0] * v[0][0] + v[0][1] * v[0][1]);
+    Scalar determinant = ridge * trace;
     for (int i = 0; i < 4; ++i) {
       for (int j = i + 1; j < 4; ++j) {
-        const Scalar cross = (v[i][0] * v[j][1] - v[i][1] * v[j][0]) * inverse;
+        const Scalar cross = v[i][0] * v[j][1] - v[i][1] * v[j][0];
         determinant = determinant + cross * cross;
         if (i == 0) form = form + cross * cross;
       }

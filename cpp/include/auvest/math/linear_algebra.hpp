@@ -22,11 +22,36 @@ inline void mirror_lower(Matrix<Scalar, N, N>& a) {
 
 /// True if every element is finite.
 template <class Scalar, int Rows, int Cols>
-inline bool all_finite(const Matrix<Scalar, Rows, Cols>& a) {
+AUVEST_INLINE bool all_finite(const Matrix<Scalar, Rows, Cols>& a) {
+  bool finite = true;
+  AUVEST_UNROLL
   for (int i = 0; i < Rows; ++i) {
-    for (int j = 0; j < Cols; ++j) {
-      if (!is_finite(a(i, j))) return false;
-    }
+    AUVEST_UNROLL
+    for (int j = 0; j < Cols; ++j) finite = finite && is_finite(a(i, j));
+  }
+  return finite;
+}
+
+/// True if every element of the lower triangle is finite.
+template <class Scalar, int N>
+AUVEST_INLINE bool lower_finite(const Matrix<Scalar, N, N>& a) {
+  bool finite = true;
+  AUVEST_UNROLL
+  for (int i = 0; i < N; ++i) {
+    AUVEST_UNROLL
+    for (int j = 0; j <= i; ++j) finite = finite && is_finite(a(i, j));
+  }
+  return finite;
+}
+
+/// The least pivots that are more than rounding noise of an elimination: 4 epsilon of the diagonal.
+/// False if a diagonal element is not positive (or is NaN).
+template <class Scalar, int N>
+AUVEST_INLINE bool pivot_floors(const Matrix<Scalar, N, N>& a, Vector<Scalar, N>& floor) {
+  AUVEST_UNROLL
+  for (int i = 0; i < N; ++i) {
+    if (!(a(i, i) > Scalar(0))) return false;
+    floor(i) = Scalar(4) * machine_epsilon<Scalar>() * a(i, i);
   }
   return true;
 }
@@ -36,20 +61,14 @@ inline bool all_finite(const Matrix<Scalar, Rows, Cols>& a) {
 /// On return the first `Cols` columns hold L (N x Cols, lower trapezoidal) and the trailing block
 /// its Schur complement, so that a = L L' + [0 0; 0 Schur].
 ///
-/// A pivot that has shrunk to less than `pivot_floor` of the diagonal element it came from is
-/// rounding noise of the elimination; it is raised to that floor, which adds a variance the format
-/// cannot resolve and keeps the factor real. The same floor holds for the Schur complement's
-/// diagonal. False, with `a` left unusable, if a diagonal element is not positive (or is NaN).
+/// A pivot below its floor is raised to it, which adds a variance the format cannot resolve and
+/// keeps the factor real. The same floor holds for the Schur complement's diagonal. False, with `a`
+/// left unusable, if a diagonal element is not positive (or is NaN).
 template <int Cols, class Scalar, int N>
 inline bool partial_cholesky(Matrix<Scalar, N, N>& a) {
   static_assert(0 < Cols && Cols <= N, "Cols is the number of columns to eliminate");
-  const Scalar pivot_floor = Scalar(4) * machine_epsilon<Scalar>();
   Vector<Scalar, N> floor;
-  AUVEST_UNROLL
-  for (int i = 0; i < N; ++i) {
-    if (!(a(i, i) > Scalar(0))) return false;
-    floor(i) = pivot_floor * a(i, i);
-  }
+  if (!pivot_floors(a, floor)) return false;
   AUVEST_UNROLL
   for (int k = 0; k < Cols; ++k) {
     if (a(k, k) < floor(k)) a(k, k) = floor(k);
@@ -71,20 +90,16 @@ inline bool partial_cholesky(Matrix<Scalar, N, N>& a) {
   return true;
 }
 
-/// a = L D L' with a unit lower triangular L, in place: D on the diagonal, L below it. Pivots are
-/// floored as in partial_cholesky. False, with `a` left unusable, if a diagonal element is not
-/// positive (or is NaN).
+/// a = L D L' with a unit lower triangular L, in place: D on the diagonal, L below it. Pivots that
+/// are zero to rounding are floored as in partial_cholesky. False, with `a` left unusable, if `a`
+/// is indefinite or a diagonal element is not positive (or is NaN).
 template <class Scalar, int N>
 inline bool ldlt(Matrix<Scalar, N, N>& a) {
-  const Scalar pivot_floor = Scalar(4) * machine_epsilon<Scalar>();
   Vector<Scalar, N> floor;
-  AUVEST_UNROLL
-  for (int i = 0; i < N; ++i) {
-    if (!(a(i, i) > Scalar(0))) return false;
-    floor(i) = pivot_floor * a(i, i);
-  }
+  if (!pivot_floors(a, floor)) return false;
   AUVEST_UNROLL
   for (int k = 0; k < N; ++k) {
+    if (a(k, k) < -(Scalar(N) * floor(k))) return false;
     if (a(k, k) < floor(k)) a(k, k) = floor(k);
     if (k + 1 == N) break;
     const Scalar inverse = Scalar(1) / a(k, k);

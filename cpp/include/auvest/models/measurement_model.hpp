@@ -7,7 +7,8 @@
 //     Vector<Scalar, M>           h(x)   the measurement without noise
 //     Matrix<Scalar, M, M>        R()    covariance of its noise
 //     Matrix<Scalar, M, Observed> H(x)   Jacobian of h (EKF only)
-//     Status                      check()  kOk, or kBadParameter if a parameter is out of range
+//     Status                      check()  kOk, or kBadParameter if a parameter is out of range;
+//                                          for who builds the model, once: an update does not ask
 //
 // It may override
 //

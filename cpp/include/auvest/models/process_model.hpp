@@ -9,6 +9,7 @@
 //
 // It may override
 //
+//     residual(a, b)         a - b, wrapped where a state is an angle that f wraps
 //     about(x, dt)           an expansion with deviations in closed form (see NumericExpansion)
 //     kClosedForm            true if it does
 //     propagate(belief, dt)  x <- f, P <- Phi P Phi' + Q in place, from the structure of Phi
@@ -43,11 +44,11 @@ struct ProcessModel {
 
     /// sum = d+ + d-, difference = d+ - d-, where d+- = f(x +- e) - f(x).
     void deviations(const State& e, State& sum, State& difference) const {
-      const State plus = model.f(x + e, dt);
-      const State minus = model.f(x - e, dt);
+      const State d_plus = model.residual(model.f(x + e, dt), centre);
+      const State d_minus = model.residual(model.f(x - e, dt), centre);
       for (int i = 0; i < N; ++i) {
-        sum(i) = (plus(i) - centre(i)) + (minus(i) - centre(i));
-        difference(i) = plus(i) - minus(i);
+        sum(i) = d_plus(i) + d_minus(i);
+        difference(i) = d_plus(i) - d_minus(i);
       }
     }
   };
@@ -63,6 +64,12 @@ struct ProcessModel {
       for (int j = 0; j <= i; ++j) belief.P(i, j) = belief.P(i, j) + noise(i, j);
     }
     belief.x = derived().f(belief.x, dt);
+  }
+
+  State residual(const State& a, const State& b) const {
+    State difference;
+    for (int i = 0; i < N; ++i) difference(i) = a(i) - b(i);
+    return difference;
   }
 
   Status check() const { return Status::kOk; }

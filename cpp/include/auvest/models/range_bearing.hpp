@@ -122,6 +122,8 @@ struct RangeBearing : MeasurementModel<RangeBearing<Scalar_, N>, Scalar_, N, 2, 
     return z;
   }
 
+  /// Jacobian of h for range and bearing; not defined (not finite) at the station itself, where the
+  /// filters use the near field.
   Jacobian H(const State& x) const { return about(x).H(); }
 
   Noise R() const {
@@ -145,7 +147,7 @@ struct RangeBearing : MeasurementModel<RangeBearing<Scalar_, N>, Scalar_, N, 2, 
     const Scalar dy = belief.x(1) - params.station_y_m;
     const Scalar square = dx * dx + dy * dy;
     const Scalar reach = params.near_field * params.near_field * (belief.P(0, 0) + belief.P(1, 1));
-    if (square > reach && square > Scalar(1e-30)) return false;
+    if (!(square <= reach) && square > Scalar(1e-30)) return false;
     position_view(dx, dy, z, view);
     return true;
   }
