@@ -159,7 +159,7 @@ def _as_real(name: str, value: object, shape: tuple[int | None, ...]) -> npt.NDA
     if value is None:
         raise TypeError(f"{name} must be {expected}, not None")
     if isinstance(value, np.ma.MaskedArray):
-        raise TypeError(f"{name} must be {expected}, not a masked array; use z.filled(np.nan)")
+        raise TypeError(f"{name} must be {expected}, not a masked array; use {name}.filled(np.nan)")
     try:
         raw = np.asarray(value)
     except ValueError:

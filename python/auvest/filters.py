@@ -754,7 +754,7 @@ def _as_steps(dt: npt.ArrayLike | None, rows: int, dtype: DType) -> Floats:
     """Take times between rows; NaN stands for the interval that the filter chooses."""
     if dt is None:
         return np.full(rows, np.nan, dtype)
-    if np.ndim(dt) == 0:
+    if np.isscalar(dt) or (isinstance(dt, np.ndarray) and dt.ndim == 0):
         return np.full(rows, _as_step(dt, dtype), dtype)
     steps = as_array("dt", dt, (None,), dtype)
     if len(steps) != rows:

@@ -47,7 +47,7 @@ CONSTRUCTORS = {
     "x0 object": (ukf([None] * 6, P0), TypeError, r"x0 must be .*, not of object"),
     "x0 Decimal": (ukf([Decimal(1)] * 6, P0), TypeError, r"x0 must be .*, not of object"),
     "x0 dict": (ukf({}, P0), TypeError, r"x0 must be .*, not of object"),
-    "x0 masked": (ukf(np.ma.masked_equal(X0, 0), P0), TypeError, "x0 must .* masked array"),
+    "x0 masked": (ukf(np.ma.masked_equal(X0, 0), P0), TypeError, r"x0 must .*; use x0\.filled"),
     "x0 column": (
         ukf(X0[:, None], P0),
         ValueError,
@@ -332,6 +332,11 @@ CALLS = {
         lambda f: f.run(Z, dt=changed(np.ones(8), 5, -0.25)),
         ValueError,
         r"dt\[5\] must not be negative, not -0\.25",
+    ),
+    "run dt ragged": (
+        lambda f: f.run(Z, dt=[0.5, [0.5]]),
+        ValueError,
+        r"dt must be an array of shape \(T,\), not rows of different lengths",
     ),
     "run dt complex": (lambda f: f.run(Z, dt=1j), TypeError, "dt must be a number, not complex"),
     "run station": (
