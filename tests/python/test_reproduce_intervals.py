@@ -107,6 +107,25 @@ def test_command(tmp_path, monkeypatch):
     assert re.search(r"\| near, turning \| normal \| 0.40 ", (tmp_path / "README.md").read_text())
 
 
+def test_ctrl_c_keeps_the_points_done(tmp_path, monkeypatch):
+    measured = intervals.measure_case
+    calls = []
+
+    def interrupted(*point, **options):
+        calls.append(point)
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+        return measured(*point, **options)
+
+    monkeypatch.setattr(intervals, "measure_case", interrupted)
+    command = ["reproduce", "intervals", "--runs", "2", "--output", str(tmp_path)]
+    result = CliRunner().invoke(app, command)
+    assert result.exit_code == 130
+    assert "2 of 36 points are written" in result.stderr
+    assert len(json.loads((tmp_path / "results.json").read_text())["cases"]) == 2
+    assert (tmp_path / "README.md").exists()
+
+
 def test_command_refuses_no_runs():
     result = CliRunner().invoke(app, ["reproduce", "intervals", "--runs", "0"])
     assert result.exit_code == 2

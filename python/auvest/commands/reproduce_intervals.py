@@ -45,11 +45,18 @@ def command(
     """Compare; the help text is :data:`HELP`."""
     terminal = Terminal(as_json=as_json, quiet=quiet)
     terminal.make_folder(output)
+    cases: list[intervals.Case] = []
+    points = intervals.points()
+    interrupted = False
     try:
         with terminal.progress("points") as progress, terminal.usage_errors():
-            cases = intervals.measure(runs=runs, seed=seed, workers=workers, progress=progress)
+            for point in points:
+                cases.append(intervals.measure_case(*point, runs=runs, seed=seed, workers=workers))
+                progress(len(cases), len(points))
     except KeyboardInterrupt:
-        terminal.fail("interrupted: nothing is written", ExitCode.INTERRUPTED)
+        interrupted = True
+        if not cases:
+            terminal.fail("interrupted: nothing was done yet", ExitCode.INTERRUPTED)
     document = {
         "command": "reproduce intervals",
         "version": version(),
@@ -57,6 +64,11 @@ def command(
     }
     with terminal.writing(output):
         write_results(output, cases, document, runs=runs, seed=seed)
+    if interrupted:
+        terminal.fail(
+            f"interrupted: {len(cases)} of {len(points)} points are written to {output}",
+            ExitCode.INTERRUPTED,
+        )
     terminal.result_json(document)
     terminal.result(_table(cases))
     terminal.result(f"page      {output / 'README.md'}")

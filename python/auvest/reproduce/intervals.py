@@ -7,7 +7,7 @@ on the plane (error, samples per second) and by the time that the error spends a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import sqrt
 from typing import Any
@@ -116,38 +116,14 @@ class Case:
         return self.less_time_above and self.rmse_ratio <= 1 + LEVEL
 
 
-def measure(
-    *,
-    runs: int = DEFAULT_RUNS,
-    seed: int = DEFAULT_SEED,
-    workers: int | None = None,
-    progress: Callable[[int, int], None] | None = None,
-) -> list[Case]:
-    """Compare the policies in every track and noise.
-
-    Parameters
-    ----------
-    runs : int
-        Monte Carlo runs of each point.
-    seed : int
-        Seed; all policies meet the same starts and draw from the same streams.
-    workers : int, optional
-        Threads.
-    progress : callable, optional
-        ``progress(done, total)`` in points of the plane.
-    """
-    points = [
+def points() -> list[tuple[str, str, float]]:
+    """Return all points to measure: track, noise, standard deviation to keep (m)."""
+    return [
         (track, noise, sigma)
         for track in TRACKS
         for noise in NOISES
         for sigma in BUDGETS[track.split(",")[0]]
     ]
-    cases = []
-    for done, (track, noise, sigma) in enumerate(points, start=1):
-        cases.append(measure_case(track, noise, sigma, runs=runs, seed=seed, workers=workers))
-        if progress is not None:
-            progress(done, len(points))
-    return cases
 
 
 def measure_case(
@@ -159,7 +135,19 @@ def measure_case(
     seed: int = DEFAULT_SEED,
     workers: int | None = None,
 ) -> Case:
-    """Compare the policies at one point: a track of :data:`TRACKS`, a noise, a budget."""
+    """Compare the policies at one point of :func:`points`.
+
+    Parameters
+    ----------
+    name, kind, sigma_m
+        The point.
+    runs : int
+        Monte Carlo runs of each policy.
+    seed : int
+        Seed; all policies meet the same starts and draw from the same streams.
+    workers : int, optional
+        Threads.
+    """
     straight = TRACKS[name]
     steered = replace(straight, wander_m=WANDER_M, wander_period_s=WANDER_PERIOD_S)
     unit = Noise(kind=kind, range_m=1.0, bearing_rad=1.0)  # type: ignore[arg-type]
