@@ -285,7 +285,7 @@ class GaussianFilter:
             }
             innovation = _as_last("innovation", state, (2,), self._dtype)
             s = _as_last("S", state, (2, 2), self._dtype)
-            nis, near_field = float(state["nis"]), bool(state["near_field"])
+            nis, near_field = float(state["nis"]), as_flag("near_field", state["near_field"])
         except KeyError as error:
             raise ValueError(f"state has no {error}: it is not from save()") from None
         with self._exclusive:

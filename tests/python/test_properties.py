@@ -1,7 +1,7 @@
 """Properties that hold for every geometry, found by search instead of by example."""
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import auvest
@@ -22,7 +22,7 @@ def beliefs(draw):
     return x0, root @ root.T
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=200, deadline=None, derandomize=True)
 @given(beliefs(), st.floats(0.1, 600), st.floats(-3.14, 3.14), ALPHAS)
 def test_an_update_never_widens_the_belief(belief, range_m, bearing, alpha):
     """P of before minus P of after is positive semidefinite, whatever the measurement says."""
@@ -35,7 +35,7 @@ def test_an_update_never_widens_the_belief(belief, range_m, bearing, alpha):
     assert gain[0] > -1e-12 * np.trace(before)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=200, deadline=None, derandomize=True)
 @given(beliefs(), st.floats(0.01, 50), st.sampled_from(["euler", "exact"]))
 def test_two_filters_predict_alike(belief, dt, discretisation):
     """EKF and UKF share a linear process: their predictions have the same bits."""
@@ -47,24 +47,26 @@ def test_two_filters_predict_alike(belief, dt, discretisation):
     assert np.array_equal(ekf.P, ukf.P)
 
 
-@settings(max_examples=100, deadline=None)
-@given(beliefs(), st.floats(5, 600), st.floats(-3.14, 3.14), st.floats(-3.1, 3.1), ALPHAS)
-def test_turning_the_world_turns_the_estimate(belief, range_m, bearing, turn, alpha):
-    """Rotate start and measurement about the station: the posterior is the rotated posterior."""
+@settings(max_examples=200, deadline=None, derandomize=True)
+@given(beliefs(), st.floats(0.1, 600), st.floats(-3.14, 3.14), st.floats(-3.1, 3.1))
+def test_turning_the_world_turns_the_estimate(belief, range_m, bearing, turn):
+    """Rotate start and measurement about the station: the EKF's posterior is rotated with them.
+
+    Not the UKF's: its points stand along the columns of a triangular root, which does not turn.
+    """
     x0, P0 = belief
+    off = bearing - np.arctan2(x0[1], x0[0])
+    assume(np.hypot(*x0[:2]) > 1e-3)
+    assume(abs(np.arctan2(np.sin(off), np.cos(off))) < 3)  # away from the cut of the residual
     sonar = auvest.RangeBearing(station=(0.0, 0.0))
     c, s = np.cos(turn), np.sin(turn)
     rotation = np.kron(np.eye(3), [[c, -s], [s, c]])
-    a = auvest.Ukf(x0, P0, measurement=sonar, alpha=alpha)
     turned = rotation @ P0 @ rotation.T
-    b = auvest.Ukf(rotation @ x0, (turned + turned.T) / 2, measurement=sonar, alpha=alpha)
-    # The sigma points stand along the columns of a triangular root, which does not turn with the
-    # world: only to second order is the transform the same. Small spread against range, then.
-    if np.hypot(*x0[:2]) < 30 * np.sqrt(np.trace(P0[:2, :2])):
-        return
+    a = auvest.Ekf(x0, P0, measurement=sonar)
+    b = auvest.Ekf(rotation @ x0, (turned + turned.T) / 2, measurement=sonar)
     a.update([range_m, bearing])
     b.update([range_m, bearing + turn])
-    spread = np.sqrt(np.diag(a.P))
-    # Third-order terms: (spread / range)^2, 1e-3, of the correction.
-    moved = np.abs(a.x - x0).max() + spread.max()
-    assert np.abs(rotation @ a.x - b.x).max() < 5e-3 * moved
+    assume(a.near_field == b.near_field)
+    # Rounding of the rotation, magnified by how much sharper the sensor is than the belief.
+    moved = np.abs(a.x - x0).max() + np.abs(x0).max()
+    assert np.abs(rotation @ a.x - b.x).max() < 1e-7 * moved

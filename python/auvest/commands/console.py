@@ -167,6 +167,10 @@ _OUTPUT = "Output"
 Runs = Annotated[
     int, typer.Option("--runs", min=1, max=100_000, help="Monte Carlo runs.", show_default=True)
 ]
+#: Runs of a command that keeps many simulations in memory at once.
+PageRuns = Annotated[
+    int, typer.Option("--runs", min=1, max=2000, help="Monte Carlo runs.", show_default=True)
+]
 Seed = Annotated[
     int,
     typer.Option(

@@ -32,7 +32,7 @@ Examples:
 
 
 def command(
-    runs: console.Runs = aukf.DEFAULT_RUNS,
+    runs: console.PageRuns = aukf.DEFAULT_RUNS,
     seed: console.Seed = aukf.DEFAULT_SEED,
     workers: console.Workers = None,
     output: Annotated[

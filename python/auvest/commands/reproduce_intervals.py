@@ -30,7 +30,7 @@ Examples:
 
 
 def command(
-    runs: console.Runs = intervals.DEFAULT_RUNS,
+    runs: console.PageRuns = intervals.DEFAULT_RUNS,
     seed: console.Seed = intervals.DEFAULT_SEED,
     workers: console.Workers = None,
     output: Annotated[
@@ -73,6 +73,9 @@ def command(
     terminal.result(_table(cases))
     terminal.result(f"page      {output / 'README.md'}")
     terminal.result(f"figure    {output / 'intervals.png'}")
+    failed = sum(figures.failed for case in cases for figures in case.policies.values())
+    if failed:
+        terminal.fail(f"{failed} runs failed; see failed_runs in results.json", ExitCode.FAILED)
 
 
 def write_results(

@@ -185,7 +185,7 @@ def measure(
 
     def compare(noise: Noise) -> Comparison:
         aukf = fly(noise)
-        steps = max(1, round(float(aukf.time_s[:, -1].mean()) / FIXED_INTERVAL_S))
+        steps = max(1, round(float(np.nanmax(aukf.time_s, axis=1).mean()) / FIXED_INTERVAL_S))
         mean = float(intervals(aukf).mean())
         result = Comparison(
             noise=noise,

@@ -119,8 +119,9 @@ TEST_CASE("square-root update: an indefinite noise is refused") {
   Matrix<double, 2, 2> indefinite;
   indefinite << 1, 2, 2, 1;
   Correction<double, 2> correction(Status::kOk);
-  CHECK(auvest::square_root_update<2>(pair, Matrix<double, 2, 2>::Zero().eval(), indefinite,
-                                      correction) == Status::kNotPositiveDefinite);
+  const Matrix<double, 2, 2> unseen = Matrix<double, 2, 2>::Zero();
+  CHECK(auvest::square_root_update<2>(pair, unseen, indefinite, correction) ==
+        Status::kNotPositiveDefinite);
 }
 
 }  // namespace

@@ -137,8 +137,9 @@ TEST_CASE("table1: tau is at most eps / gamma2, so T falls to T_min (finding 1)"
 TEST_CASE("the clamps hold for any input") {
   Law law;
   law.restart(Position(0, 0), Position(0, 0));
-  const Position wild[] = {Position(1e150, 0), Position(-1e150, 1e-150), Position(0, 0),
-                           Position(1e-160, 1e-160)};
+  const Position wild[] = {Position(1e308, -1e308), Position(-1e308, 1e308),
+                           Position(1e150, 0),      Position(-1e150, 1e-150),
+                           Position(0, 0),          Position(1e-160, 1e-160)};
   for (const auto& estimate : wild) {
     for (const auto& reference : wild) {
       const double t = law.next(Estimate{estimate}, reference);
@@ -146,6 +147,7 @@ TEST_CASE("the clamps hold for any input") {
       CHECK(t <= law.params.max_s);
       CHECK(law.memory.tau >= law.params.tau_min);
       CHECK(law.memory.tau <= law.params.tau_max);
+      CHECK(std::isfinite(law.memory.mahalanobis_squared));
     }
   }
 }

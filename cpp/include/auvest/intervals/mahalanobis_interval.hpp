@@ -133,22 +133,24 @@ struct MahalanobisInterval {
   /// the start, where X(0) = R(0), and on noise-free straight legs: epsilon times its trace is
   /// added to its diagonal, which gives the pseudo-inverse's distance along the line there. It is
   /// felt where the points are closer to a line than some sqrt(epsilon) of their spread (1e-3 in
-  /// float), and nowhere else. If all four points coincide, d^2 = 0.
+  /// float), and nowhere else. If all four points coincide (or overflow), d^2 = 0.
   Scalar squared_distance(const Position& estimate, const Position& reference) const {
     const Position* points[4] = {&estimate, &reference, &memory.last_estimate,
                                  &memory.last_reference};  // Eq. (9)
     Scalar v[4][2];
     Scalar largest = Scalar(0);
     for (int axis = 0; axis < 2; ++axis) {
-      const Scalar mean = Scalar(0.25) * (((*points[0])(axis) + (*points[1])(axis)) +
-                                          ((*points[2])(axis) + (*points[3])(axis)));  // Eq. (10)
+      const Scalar quarter = Scalar(0.25);
+      const Scalar mean =
+          (quarter * (*points[0])(axis) + quarter * (*points[1])(axis)) +
+          (quarter * (*points[2])(axis) + quarter * (*points[3])(axis));  // Eq. (10)
       for (int i = 0; i < 4; ++i) {
         v[i][axis] = (*points[i])(axis)-mean;
         const Scalar size = v[i][axis] < Scalar(0) ? -v[i][axis] : v[i][axis];
         if (size > largest) largest = size;
       }
     }
-    if (!(largest > Scalar(1e-30))) return Scalar(0);
+    if (!(largest > Scalar(1e-30)) || !math::is_finite(largest)) return Scalar(0);
 
     // d^2 does not change with the unit of length: take the largest component, against overflow.
     const Scalar inverse = Scalar(1) / largest;
