@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from auvest import metrics, scenarios
 from auvest._core import Status
+from auvest.commands.version import version
 from auvest.errors import FilterError
 from auvest.filters import Aukf, Ekf, RunResult, Ukf
 from auvest.intervals import CovarianceBudget, FixedInterval, MahalanobisInterval
@@ -28,3 +29,5 @@ __all__ = [
     "metrics",
     "scenarios",
 ]
+
+__version__ = version()

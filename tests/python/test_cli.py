@@ -92,6 +92,8 @@ BAD = [
     (["--tau0", "0.999"], ["--interval mahalanobis", "tau_max", "0.999"]),
     (["--fixed-interval", "0.5"], ["--fixed-interval", "belongs to --interval fixed"]),
     (["--budget", "0.1"], ["--budget", "belongs to --interval covariance-budget"]),
+    (["--filter", "ekf", "--alpha", "1"], ["--alpha", "belongs to --filter ukf or aukf"]),
+    (["--filter", "ekf", "--kappa", "-3"], ["--kappa", "belongs to --filter ukf or aukf"]),
     (["--interval", "fixed", "--tau0", "0.5"], ["--tau0", "belongs to --interval mahalanobis"]),
     (["--interval", "fixed", "--preset", "table1"], ["--preset", "--interval mahalanobis"]),
     (["--filter", "ukf", "--interval", "mahalanobis"], ["--interval", "needs --filter aukf"]),

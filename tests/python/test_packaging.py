@@ -9,6 +9,8 @@ from importlib.metadata import version
 
 import pytest
 
+import auvest
+
 
 @pytest.fixture(scope="module")
 def declared_version(root):
@@ -29,7 +31,7 @@ def wheel(root, tmp_path_factory):
 
 
 def test_version_has_one_source(declared_version, wheel):
-    assert version("auvest") == declared_version
+    assert version("auvest") == auvest.__version__ == declared_version
     assert wheel.name.split("-")[:2] == ["auvest", declared_version]
 
 

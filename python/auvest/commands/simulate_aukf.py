@@ -64,6 +64,7 @@ _LAW = MahalanobisInterval()
 
 
 def command(
+    ctx: typer.Context,
     filter_name: Annotated[
         FilterName, typer.Option("--filter", help="The filter.", rich_help_panel=_FILTER)
     ] = "aukf",
@@ -202,6 +203,10 @@ def command(
 ) -> None:
     """Simulate; the help text is :data:`HELP`."""
     terminal = Terminal(as_json=as_json, quiet=quiet)
+    if filter_name == "ekf":
+        _refuse_given(
+            ctx, ("alpha", "beta", "kappa"), "belongs to --filter ukf or aukf, not to ekf."
+        )
     policy = _interval_policy(
         filter_name, interval, preset=preset, tau0=tau0, fixed=fixed_interval, budget=budget
     )
@@ -234,9 +239,7 @@ def command(
     settings = {
         "filter": filter_name,
         "interval": {"policy": type(policy).__name__, **asdict(policy)},
-        "alpha": alpha,
-        "beta": beta,
-        "kappa": kappa,
+        **({} if filter_name == "ekf" else {"alpha": alpha, "beta": beta, "kappa": kappa}),
         "dtype": dtype,
         "track": track,
         "noise": asdict(world),
@@ -295,6 +298,14 @@ def command(
             f"after {int(result.samples[first])} steps: {Status(int(result.status[first])).name}",
             ExitCode.FAILED,
         )
+
+
+def _refuse_given(ctx: typer.Context, names: tuple[str, ...], why: str) -> None:
+    """Refuse options that were given and would do nothing."""
+    for name in names:
+        source = ctx.get_parameter_source(name)
+        if source is not None and source.name != "DEFAULT":
+            raise typer.BadParameter(why, param_hint=f"'--{name}'")
 
 
 def _interval_policy(
