@@ -340,6 +340,18 @@ def test_bad_input(call, error, message):
         call()
 
 
+def test_start_is_the_state_that_the_track_leaves_with():
+    straight = tracking.Track(
+        kind="straight", position=(1, 2), velocity=(3, 4), acceleration=(5, 6)
+    )
+    assert straight.start == (1, 2, 3, 4, 5, 6)
+    turn = tracking.Track(kind="turn", position=(1, 2), velocity=(3, 4), turn_rate=0.5)
+    # The centripetal acceleration is the second difference of the track.
+    h = 1e-3
+    p = np.array([turn.position_at(t) for t in (0, h, 2 * h)])
+    assert turn.start[4:] == pytest.approx((p[0] - 2 * p[1] + p[2]) / h**2, rel=2e-3)
+
+
 def test_position_at():
     turn = tracking.Track(kind="turn", position=(1.0, 2.0), velocity=(0.5, 0.0), turn_rate=0.1)
     # Half a turn later the vehicle is one diameter, 2 v / rate, to the left of its course.

@@ -131,13 +131,7 @@ def paper_filter(
     dtype : {"float64", "float32"}
         Precision.
     """
-    start = paper_track(track)
-    acceleration = start.acceleration
-    if start.kind == "turn":
-        # Towards the centre of the turn, speed times turn rate.
-        vx, vy = start.velocity
-        acceleration = (-start.turn_rate * vy, start.turn_rate * vx)
-    x0 = np.array([*start.position, *start.velocity, *acceleration])
+    x0 = np.array(paper_track(track).start)
     P0 = np.diag(np.repeat(np.square(p0_sigma), 2))
     process = ConstantAcceleration(discretisation="euler" if track == "paper" else "exact")
     sigma_range_m, sigma_bearing_rad = noise.standard_deviation

@@ -69,6 +69,15 @@ class Track:
         period = as_number("wander_period_s", self.wander_period_s, "positive")
         object.__setattr__(self, "wander_period_s", period)
 
+    @property
+    def start(self) -> tuple[float, ...]:
+        """The true state at time 0: position (m), velocity (m/s), acceleration (m/s^2)."""
+        acceleration = self.acceleration
+        if self.kind == "turn":  # towards the centre of the turn, speed times turn rate
+            vx, vy = self.velocity
+            acceleration = (-self.turn_rate * vy, self.turn_rate * vx)
+        return (*self.position, *self.velocity, *acceleration)
+
     def position_at(self, time_s: float) -> tuple[float, float]:
         """Give the true position (m) after one step of this many seconds."""
         core = self._as_core()
