@@ -39,7 +39,7 @@ EXIT_CODES = (
 
 
 class Terminal:
-    """Where a command writes: ``result`` to stdout, ``say`` and progress to stderr."""
+    """Where a command writes: results to stdout, errors and progress to stderr."""
 
     def __init__(self, *, as_json: bool, quiet: bool) -> None:
         self.as_json = as_json
@@ -56,10 +56,6 @@ class Terminal:
         """Print the one JSON object, if it was asked for."""
         if self.as_json:
             typer.echo(to_json(value))
-
-    def say(self, message: str) -> None:
-        """Print a message that may be left out."""
-        self._messages.print(escape(message))
 
     def fail(self, message: str, code: ExitCode) -> NoReturn:
         """Print one line on stderr and end."""
@@ -131,13 +127,6 @@ def positive(value: float | None) -> float | None:
     """Option callback: a finite number above zero."""
     if value is not None and not (math.isfinite(value) and value > 0):
         raise typer.BadParameter(f"{value} is not a finite number above 0.")
-    return value
-
-
-def not_negative(value: float | None) -> float | None:
-    """Option callback: a finite number, zero or above."""
-    if value is not None and not (math.isfinite(value) and value >= 0):
-        raise typer.BadParameter(f"{value} is not a finite number of at least 0.")
     return value
 
 
