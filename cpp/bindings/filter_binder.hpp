@@ -272,9 +272,12 @@ class FilterBinder {
 
   /// A draw from N(x, P): six normal deviates, in pairs.
   static typename Adaptive::State deviate(typename Adaptive::State x,
-                                          typename Adaptive::Covariance p, math::Random& random) {
+                                          const typename Adaptive::Covariance& p,
+                                          math::Random& random) {
     static_assert(kStates % 2 == 0, "deviates come in pairs");
-    if (!math::partial_cholesky<kStates>(p)) return x;  // reset refuses P and says why
+    typename Adaptive::Covariance root;
+    Matrix<Scalar, 1, kStates> no_others;
+    if (!math::factor_leading(p, root, no_others)) return x;  // reset refuses P and says why
     typename Adaptive::State normal;
     for (int i = 0; i < kStates; i += 2) {
       double first = 0;
@@ -284,7 +287,7 @@ class FilterBinder {
       normal(i + 1) = static_cast<Scalar>(second);
     }
     for (int i = 0; i < kStates; ++i) {
-      for (int j = 0; j <= i; ++j) x(i) = x(i) + p(i, j) * normal(j);
+      for (int j = 0; j <= i; ++j) x(i) = x(i) + root(i, j) * normal(j);
     }
     return x;
   }

@@ -52,6 +52,8 @@ class numeric_limits<ExplicitDouble> : public numeric_limits<double> {
   static constexpr ExplicitDouble epsilon() {
     return ExplicitDouble(numeric_limits<double>::epsilon());
   }
+  static constexpr ExplicitDouble min() { return ExplicitDouble(numeric_limits<double>::min()); }
+  static constexpr ExplicitDouble max() { return ExplicitDouble(numeric_limits<double>::max()); }
 };
 }  // namespace std
 

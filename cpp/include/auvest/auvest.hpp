@@ -1,6 +1,8 @@
 // auvest: estimators for small autonomous underwater vehicles. Everything, in one include.
 #pragma once
 
+#include "auvest/config.hpp"  // first: it says what is wrong with a compiler
+
 #include "auvest/filters/adaptive_interval.hpp"
 #include "auvest/filters/aukf.hpp"
 #include "auvest/filters/ekf.hpp"

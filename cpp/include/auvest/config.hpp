@@ -1,8 +1,18 @@
-// The one place that looks at the compiler and the platform.
+// What auvest asks of the compiler, and the words that differ between compilers and chips.
 //
 // auvest promises the same float bits on every target. That holds only where the compiler keeps
 // IEEE 754 semantics, so a build that gives them up is refused here, at compile time.
 #pragma once
+
+#if !defined(__GNUC__)
+#error "auvest: compile with GCC or Clang."
+#elif !defined(__clang__) && __GNUC__ < 5
+#error "auvest: this GCC is too old; use GCC 5 or later (Arduino AVR Boards 1.6.22 or later)."
+#endif
+
+#if __cplusplus < 201103L
+#error "auvest: compile as C++11 or later, for example with -std=gnu++11."
+#endif
 
 #if defined(__FAST_MATH__) || defined(__ASSOCIATIVE_MATH__) || defined(__RECIPROCAL_MATH__) || \
     (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0)
@@ -11,6 +21,11 @@
 Compile without it; add -ffp-contract=off."
 #endif
 
+#if !__has_include(<cfloat>)
+#error \
+    "auvest: avr-gcc has no C++ standard headers. Use the Arduino library auvest, which has them, or \
+add firmware/avr_std to the include path."
+#endif
 #include <cfloat>
 
 #if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0
@@ -24,16 +39,23 @@ static_assert(sizeof(float) == 4 && FLT_RADIX == 2 && FLT_MANT_DIG == 24,
 
 // A fixed trip count, written out by the compiler. It changes speed, never the order of operations.
 // (clang unrolls such loops by itself; gcc without optimisation would warn that it does not.)
-#if defined(__GNUC__) && __GNUC__ >= 8 && !defined(__clang__) && !defined(__AVR__) && \
-    defined(__OPTIMIZE__)
+#if __GNUC__ >= 8 && !defined(__clang__) && !defined(__AVR__) && defined(__OPTIMIZE__)
 #define AUVEST_UNROLL _Pragma("GCC unroll 16")
 #else
 #define AUVEST_UNROLL
 #endif
 
 // Small kernels that must disappear into their caller.
-#if defined(__GNUC__) && !defined(__AVR__)
-#define AUVEST_INLINE inline __attribute__((always_inline))
-#else
+#if defined(__AVR__)
 #define AUVEST_INLINE inline
+#else
+#define AUVEST_INLINE inline __attribute__((always_inline))
+#endif
+
+// On the 8-bit chip a function that is called once is still called: inlined, its frame would lie on
+// the stack for as long as its caller's.
+#if defined(__AVR__)
+#define AUVEST_OUTLINE __attribute__((noinline))
+#else
+#define AUVEST_OUTLINE
 #endif

@@ -1,9 +1,7 @@
 // The vocabulary types: fixed-size vectors and matrices, and the Gaussian belief of a filter.
 #pragma once
 
-#include <Eigen/Core>
-
-#include "auvest/config.hpp"
+#include "auvest/eigen.hpp"
 
 namespace auvest {
 

@@ -46,13 +46,13 @@ void check_against_textbook() {
     Correction<double, M> correction(Status::kOk);
     correction.innovation = random_matrix<double, M, 1>(random, 1);
 
-    REQUIRE(auvest::math::partial_cholesky<O>(belief.P));
-    Matrix<double, O, O> l = Matrix<double, O, O>::Zero();
-    for (int i = 0; i < O; ++i) {
-      for (int j = 0; j <= i; ++j) l(i, j) = belief.P(i, j);
-    }
-    const Matrix<double, O, M> a = (h * l).transpose();
-    REQUIRE(auvest::square_root_update<M>(belief, a, noise, correction) == Status::kOk);
+    Matrix<double, O, O> l;
+    Matrix<double, auvest::math::other_states(N, O), O> slope;
+    REQUIRE(auvest::math::factor_leading(p, l, slope));
+    Matrix<double, M, O> a = h * l;
+    Matrix<double, M, M> used_noise = noise;
+    REQUIRE(auvest::square_root_update(belief, l, slope, a, used_noise, correction) ==
+            Status::kOk);
 
     const Matrix<double, M, M> s = full * p * full.transpose() + noise;
     const Matrix<double, N, M> gain = p * full.transpose() * s.inverse();
@@ -84,14 +84,16 @@ TEST_CASE("square-root update: float stays positive where P - K S K' does not") 
   Belief<float, 2> belief;
   belief.x.setZero();
   belief.P << 1e6f, 0, 9.9e5f, 1e6f;
-  REQUIRE(auvest::math::partial_cholesky<2>(belief.P));
-  Matrix<float, 2, 1> a;
-  a << belief.P(0, 0), 0;  // H = (1, 0)
+  Matrix<float, 2, 2> root;
+  Matrix<float, 1, 2> none;
+  REQUIRE(auvest::math::factor_leading(belief.P, root, none));
+  Matrix<float, 1, 2> a;
+  a << root(0, 0), 0;  // H = (1, 0)
   Matrix<float, 1, 1> noise;
   noise << 1e-6f;
   Correction<float, 1> correction(Status::kOk);
   correction.innovation << 5;
-  REQUIRE(auvest::square_root_update<1>(belief, a, noise, correction) == Status::kOk);
+  REQUIRE(auvest::square_root_update(belief, root, none, a, noise, correction) == Status::kOk);
   // Closed form: P_00 = R to 1e-12, P_11 = P_11 - P_10^2 / P_00 = 1e6 - 9.801e5 = 19900.
   CHECK(belief.P(0, 0) > 0);
   CHECK(belief.P(0, 0) < 1e-2f);
@@ -101,26 +103,80 @@ TEST_CASE("square-root update: float stays positive where P - K S K' does not") 
   CHECK(belief.x(1) == close_to(5 * 0.99, 1e-6));
 }
 
+TEST_CASE("square-root update: after an outage, float keeps what the fix says of the velocity") {
+  // 1000 s without a fix: the position error is nearly the velocity error times the time.
+  const double time = 1000;
+  const double variance = 0.01;  // of the velocity
+  const double fix = 0.0025;
+  Belief<float, 2> belief;
+  belief.x.setZero();
+  belief.P << float(variance * time * time + 0.01), 0, float(variance * time), float(variance);
+  Matrix<float, 1, 1> root;
+  Matrix<float, 1, 1> slope;
+  REQUIRE(auvest::math::factor_leading(belief.P, root, slope));
+  Matrix<float, 1, 1> a;
+  a << root(0, 0);
+  Matrix<float, 1, 1> noise;
+  noise << float(fix);
+  Correction<float, 1> correction(Status::kOk);
+  correction.innovation << 30;
+  REQUIRE(auvest::square_root_update(belief, root, slope, a, noise, correction) == Status::kOk);
+  CHECK(belief.P(0, 0) == close_to(fix, 1e-3));
+  // P_uo+ = B P_oo+: a relative error, not one of the prior's size.
+  CHECK(belief.P(1, 0) == close_to(fix / time, 1e-3));
+  // What the start did not know, 0.01 m^2, and what the fix does not know. One rounding of the
+  // prior's variance is a tenth of that.
+  CHECK(std::fabs(double(belief.P(1, 1)) - (0.01 + fix) / (time * time)) <
+        double(std::numeric_limits<float>::epsilon()) * variance);
+  CHECK(belief.x(1) == close_to(30 / time, 1e-5));
+}
+
+TEST_CASE("square-root update: what would overflow is refused and changes nothing") {
+  for (const float innovation : {1e38f, 3e38f}) {
+    Belief<float, 2> belief;
+    belief.x << 3e38f, 1;
+    belief.P << 1e4f, 0, 1, 1e4f;
+    Matrix<float, 1, 1> root;
+    Matrix<float, 1, 1> slope;
+    REQUIRE(auvest::math::factor_leading(belief.P, root, slope));
+    Matrix<float, 1, 1> a;
+    a << root(0, 0);
+    Matrix<float, 1, 1> noise;
+    noise << 1;
+    Correction<float, 1> correction(Status::kOk);
+    correction.innovation << innovation;
+    CHECK(auvest::square_root_update(belief, root, slope, a, noise, correction) ==
+          Status::kOverflow);
+    CHECK(belief.x(0) == 3e38f);
+    CHECK(belief.x(1) == 1);
+    CHECK(belief.P(0, 0) == 1e4f);
+    CHECK(belief.P(1, 0) == 1);
+  }
+}
+
 TEST_CASE("square-root update: an indefinite noise is refused") {
+  Matrix<double, 1, 1> one = Matrix<double, 1, 1>::Identity();
   Belief<double, 1> belief;
   belief.x << 0;
   belief.P << 1;
-  const Matrix<double, 1, 1> a = Matrix<double, 1, 1>::Identity();
   for (const double bad : {0.0, -1.0, std::nan("")}) {
+    Matrix<double, 1, 1> a = one;
     Matrix<double, 1, 1> noise;
     noise << bad;
     Correction<double, 1> correction(Status::kOk);
-    CHECK(auvest::square_root_update<1>(belief, a, noise, correction) ==
+    CHECK(auvest::square_root_update(belief, one, one, a, noise, correction) ==
           Status::kNotPositiveDefinite);
   }
   Belief<double, 2> pair;
   pair.x.setZero();
   pair.P.setIdentity();
+  const Matrix<double, 2, 2> root = pair.P;
+  const Matrix<double, 1, 2> none = Matrix<double, 1, 2>::Zero();
   Matrix<double, 2, 2> indefinite;
   indefinite << 1, 2, 2, 1;
   Correction<double, 2> correction(Status::kOk);
-  const Matrix<double, 2, 2> unseen = Matrix<double, 2, 2>::Zero();
-  CHECK(auvest::square_root_update<2>(pair, unseen, indefinite, correction) ==
+  Matrix<double, 2, 2> unseen = Matrix<double, 2, 2>::Zero();
+  CHECK(auvest::square_root_update(pair, root, none, unseen, indefinite, correction) ==
         Status::kNotPositiveDefinite);
 }
 

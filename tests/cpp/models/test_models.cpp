@@ -146,8 +146,6 @@ auvest::RangeBearing<double, 6> sonar() {
   return auvest::RangeBearing<double, 6>(p);
 }
 
-using View = auvest::RangeBearing<double, 6>::View;
-
 TEST_CASE("process models") {
   check_process(auvest::EulerAcceleration<double>(), 0.5);
   check_process(auvest::ExactAcceleration<double>(), 0.5);
@@ -289,15 +287,17 @@ TEST_CASE("range and bearing: the near field begins where the belief reaches the
   belief.x(1) = 2;
   belief.P.setIdentity();
   const Vector<double, 2> z(1.1, 0.4);
-  View view;
+  Vector<double, 2> innovation;
+  Matrix<double, 2, 2> noise;
   belief.P(0, 0) = 0.01;
   belief.P(1, 1) = 0.029;  // sqrt(P_xx + P_yy) = 0.9874 m / 5
-  CHECK_FALSE(model.near_field(belief, z, view));
+  const auto point = model.about(belief.x);
+  CHECK_FALSE(model.near_field(point, belief.P, z, innovation, noise));
   belief.P(1, 1) = 0.031;  // 1.0124 m / 5
-  REQUIRE(model.near_field(belief, z, view));
+  REQUIRE(model.near_field(point, belief.P, z, innovation, noise));
   // The measured position minus the believed one.
-  CHECK(view.innovation(0) == close_to(1.1 * std::cos(0.4) - 1, 1e-12));
-  CHECK(view.innovation(1) == close_to(1.1 * std::sin(0.4), 1e-12));
+  CHECK(innovation(0) == close_to(1.1 * std::cos(0.4) - 1, 1e-12));
+  CHECK(innovation(1) == close_to(1.1 * std::sin(0.4), 1e-12));
 }
 
 TEST_CASE("range and bearing: covariance of the position form, by Monte Carlo") {
@@ -327,18 +327,19 @@ TEST_CASE("range and bearing: covariance of the position form, by Monte Carlo") 
       belief.x.setZero();
       belief.x(0) = c.range;
       belief.P.setIdentity();
-      View view;
-      REQUIRE(model.near_field(belief, z, view));
+      Vector<double, 2> innovation = Vector<double, 2>::Zero();
+      Matrix<double, 2, 2> noise = Matrix<double, 2, 2>::Zero();
+      REQUIRE(model.near_field(model.about(belief.x), belief.P, z, innovation, noise));
       const double cosine = std::cos(z(1)), sine = std::sin(z(1));
-      const double u = cosine * view.innovation(0) + sine * view.innovation(1);
-      const double v = -sine * view.innovation(0) + cosine * view.innovation(1);
+      const double u = cosine * innovation(0) + sine * innovation(1);
+      const double v = -sine * innovation(0) + cosine * innovation(1);
       along += u * u / n;
       across += v * v / n;
-      r_along += (cosine * cosine * view.R(0, 0) + 2 * cosine * sine * view.R(1, 0) +
-                  sine * sine * view.R(1, 1)) /
+      r_along += (cosine * cosine * noise(0, 0) + 2 * cosine * sine * noise(1, 0) +
+                  sine * sine * noise(1, 1)) /
                  n;
-      r_across += (sine * sine * view.R(0, 0) - 2 * cosine * sine * view.R(1, 0) +
-                   cosine * cosine * view.R(1, 1)) /
+      r_across += (sine * sine * noise(0, 0) - 2 * cosine * sine * noise(1, 0) +
+                   cosine * cosine * noise(1, 1)) /
                   n;
     }
     const double r2 = c.range * c.range;

@@ -20,12 +20,15 @@ class AdaptiveInterval : public Filter {
   using Position = Vector<Scalar, 2>;
 
   explicit AdaptiveInterval(const Filter& filter, const Policy& policy = Policy())
-      : Filter(filter), policy_(policy), interval_(policy.initial()) {}
+      : Filter(filter),
+        policy_(policy),
+        interval_(policy.initial()),
+        policy_check_(policy.check()) {}
 
   /// Sets the belief and starts the policy; `reference` is the desired position (m) at step 0.
   Status reset(const State& x0, const Covariance& P0, const Position& reference) {
     if (!math::all_finite(reference)) return Status::kNotFinite;
-    if (policy_.check() != Status::kOk) return Status::kBadParameter;
+    if (policy_check_ != Status::kOk) return policy_check_;
     const Status status = Filter::reset(x0, P0);
     if (status != Status::kOk) return status;
     Position estimate;
@@ -51,12 +54,13 @@ class AdaptiveInterval : public Filter {
     const Status status = Filter::restore(belief);
     if (status != Status::kOk) return status;
     policy_ = policy;
+    policy_check_ = Status::kOk;
     interval_ = interval;
     return Status::kOk;
   }
 
   /// Chooses the interval to the next sample; `reference` is the desired position (m) now.
-  Status feedback(const Position& reference) {
+  AUVEST_OUTLINE Status feedback(const Position& reference) {
     if (!this->initialised()) return Status::kNotInitialised;
     if (!math::all_finite(reference)) return Status::kNotFinite;
     interval_ = policy_.next(*this, reference);
@@ -69,6 +73,7 @@ class AdaptiveInterval : public Filter {
  private:
   Policy policy_;
   Scalar interval_;
+  Status policy_check_;
 };
 
 }  // namespace auvest

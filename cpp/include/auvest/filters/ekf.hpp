@@ -15,24 +15,27 @@ class Ekf : public GaussianFilter<Ekf<Process>, Process> {
   using typename Base::Scalar;
   using typename Base::State;
 
-  explicit Ekf(const Process& process) : Base(process) {}
-
-  /// kBadParameter if a parameter of the process is out of range.
-  Status check() const { return this->process().check(); }
+  explicit Ekf(const Process& process) : Base(process, process.check()) {}
 
   Status predict_belief(BeliefType& belief, Scalar dt) const {
     this->process().propagate(belief, dt);
     return Status::kOk;
   }
 
-  template <class Model>
-  Status linearise(const Model& model, const State& x, const Covariance& factor,
+  template <class Model, class Point>
+  Status linearise(const Model& model, const Point& point,
+                   const Matrix<Scalar, Model::kObserved, Model::kObserved>& root,
                    const typename Model::Measurement& z, typename Model::Measurement& innovation,
-                   Matrix<Scalar, Model::kObserved, Model::kSize>& a,
+                   Matrix<Scalar, Model::kSize, Model::kObserved>& a,
                    typename Model::Noise& noise) const {
-    const auto point = model.about(x);
     innovation = model.residual(z, point.value());
-    Base::project(point.H(), factor, a);
+    const typename Model::Jacobian h = point.H();
+    for (int m = 0; m < Model::kSize; ++m) {  // A = H L
+      for (int k = 0; k < Model::kObserved; ++k) {
+        a(m, k) = h(m, k) * root(k, k);
+        for (int i = k + 1; i < Model::kObserved; ++i) a(m, k) = a(m, k) + h(m, i) * root(i, k);
+      }
+    }
     noise = model.R();
     return Status::kOk;
   }

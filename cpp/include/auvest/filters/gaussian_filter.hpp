@@ -3,12 +3,11 @@
 //
 // A filter derives from GaussianFilter<Itself, Process> and offers
 //
-//     Status check()
-//         kOk, or kBadParameter if a parameter of the process or the filter is out of range
 //     Status predict_belief(belief, dt)
 //         belief after dt seconds
-//     Status linearise(model, x, factor, z, innovation, A, E)
-//         the measurement in the coordinates of the factor L of P (see square_root_update.hpp)
+//     Status linearise(model, point, root, z, innovation, A, E)
+//         the measurement about point = model.about(x), in the coordinates of the root L of P_oo
+//         (see square_root_update.hpp)
 #pragma once
 
 #include "auvest/filters/square_root_update.hpp"
@@ -28,26 +27,28 @@ class GaussianFilter {
   using Covariance = Matrix<Scalar, kStates, kStates>;
   using BeliefType = Belief<Scalar, kStates>;
 
-  explicit GaussianFilter(const Process& process) : process_(process), initialised_(false) {
-    belief_.x.setZero();
-    belief_.P.setZero();
+  /// `check` says whether all parameters are in range: asked once, and where they are constants, by
+  /// the compiler.
+  GaussianFilter(const Process& process, Status check)
+      : process_(process), check_(check), initialised_(false) {
+    math::set_zero(belief_.x);
+    math::set_zero(belief_.P);
   }
 
   /// Sets the belief. Only the lower triangle of P0 is read.
   Status reset(const State& x0, const Covariance& P0) {
-    const Status status = derived().check();
-    if (status != Status::kOk) return status;
+    if (check_ != Status::kOk) return check_;
     if (!math::all_finite(x0) || !math::lower_finite(P0)) return Status::kNotFinite;
     if (!math::is_positive_definite(P0)) return Status::kNotPositiveDefinite;
-    belief_.x = x0;
-    belief_.P = P0;
+    math::copy(x0, belief_.x);
+    math::copy(P0, belief_.P);
     initialised_ = true;
     return Status::kOk;
   }
 
   /// Takes back a belief saved from belief(): the same bits go on.
   Status restore(const BeliefType& saved) {
-    if (!math::all_finite(saved.x) || !math::lower_finite(saved.P)) return Status::kNotFinite;
+    if (!math::all_finite(saved)) return Status::kNotFinite;
     Covariance p = saved.P;
     if (!math::ldlt(p)) return Status::kNotPositiveDefinite;
     belief_ = saved;
@@ -56,26 +57,26 @@ class GaussianFilter {
   }
 
   /// Carries the belief dt >= 0 seconds forward.
-  Status predict(Scalar dt) {
+  AUVEST_OUTLINE Status predict(Scalar dt) {
     if (!initialised_) return Status::kNotInitialised;
     if (!math::is_finite(dt)) return Status::kNotFinite;
     if (dt < Scalar(0)) return Status::kTimeBackwards;
     const BeliefType before = belief_;
-    const Status status = derived().predict_belief(belief_, dt);
-    return keep(status, math::all_finite(belief_.x) && math::lower_finite(belief_.P), before);
+    Status status = derived().predict_belief(belief_, dt);
+    if (status == Status::kOk && !math::all_finite(belief_)) status = Status::kOverflow;
+    if (status != Status::kOk) math::copy(before, belief_);
+    return status;
   }
 
   /// Corrects the belief by the measurement z of a sensor described by `model`.
   template <class Model>
-  Correction<Scalar, Model::kSize> update(const typename Model::Measurement& z,
-                                          const Model& model) {
+  AUVEST_OUTLINE Correction<Scalar, Model::kSize> update(const typename Model::Measurement& z,
+                                                         const Model& model) {
     static_assert(Model::kStates == kStates, "the measurement model is for another state");
     constexpr int kSize = Model::kSize;
     Correction<Scalar, kSize> correction(Status::kOk);
     correction.status = correct(z, model, correction);
-    if (correction.status != Status::kOk) {
-      correction = Correction<Scalar, kSize>(correction.status);
-    }
+    if (correction.status != Status::kOk) correction.clear(correction.status);
     return correction;
   }
 
@@ -90,22 +91,10 @@ class GaussianFilter {
 
   /// The belief as the filter holds it: only the lower triangle of its P has a meaning.
   const BeliefType& belief() const { return belief_; }
+  /// kBadParameter if a parameter of the filter or its process is out of range: no reset then.
+  Status check() const { return check_; }
   bool initialised() const { return initialised_; }
   const Process& process() const { return process_; }
-
- protected:
-  /// A = (H L)' for the first Observed columns of the factor.
-  template <class Jacobian, int Observed, int Size>
-  static void project(const Jacobian& h, const Covariance& factor,
-                      Matrix<Scalar, Observed, Size>& a) {
-    for (int k = 0; k < Observed; ++k) {
-      for (int m = 0; m < Size; ++m) {
-        Scalar sum = h(m, k) * factor(k, k);
-        for (int i = k + 1; i < Observed; ++i) sum = sum + h(m, i) * factor(i, k);
-        a(k, m) = sum;
-      }
-    }
-  }
 
  private:
   const Derived& derived() const { return static_cast<const Derived&>(*this); }
@@ -116,48 +105,39 @@ class GaussianFilter {
     if (!initialised_) return Status::kNotInitialised;
     if (!math::all_finite(z)) return Status::kNotFinite;
 
-    const BeliefType before = belief_;
-    const Status status = correct_belief(z, model, correction);
-    bool finite = math::all_finite(belief_.x);  // P is a square: finite if its diagonal is
-    AUVEST_UNROLL
-    for (int i = 0; i < kStates; ++i) finite = finite && math::is_finite(belief_.P(i, i));
-    return keep(status, finite, before);
+    constexpr int kSize = Model::kSize;
+    constexpr int kObserved = Model::kObserved;
+    Matrix<Scalar, kObserved, kObserved> root;
+    Matrix<Scalar, math::other_states(kStates, kObserved), kObserved> slope;
+    if (!math::factor_leading(belief_.P, root, slope)) return Status::kNotPositiveDefinite;
+
+    Matrix<Scalar, kSize, kObserved> a;
+    Matrix<Scalar, kSize, kSize> noise;
+    const Status status = linearise(z, model, root, correction, a, noise);
+    return status == Status::kOk ? square_root_update(belief_, root, slope, a, noise, correction)
+                                 : status;
   }
 
   template <class Model>
-  AUVEST_INLINE Status correct_belief(const typename Model::Measurement& z, const Model& model,
-                                      Correction<Scalar, Model::kSize>& correction) {
-    constexpr int kSize = Model::kSize;
-    constexpr int kObserved = Model::kObserved;
-    Matrix<Scalar, kObserved, kSize> a;
-    Matrix<Scalar, kSize, kSize> noise;
-    typename Model::View view;
-    correction.near_field = model.near_field(belief_, z, view);
-    if (!math::partial_cholesky<kObserved>(belief_.P)) return Status::kNotPositiveDefinite;
-    if (correction.near_field) {
-      correction.innovation = view.innovation;
-      project(view.H, belief_.P, a);
-      noise = view.R;
-    } else {
-      const Status status =
-          derived().linearise(model, belief_.x, belief_.P, z, correction.innovation, a, noise);
-      if (status != Status::kOk) return status;
+  AUVEST_OUTLINE AUVEST_INLINE Status
+  linearise(const typename Model::Measurement& z, const Model& model,
+            const Matrix<Scalar, Model::kObserved, Model::kObserved>& root,
+            Correction<Scalar, Model::kSize>& correction,
+            Matrix<Scalar, Model::kSize, Model::kObserved>& a, typename Model::Noise& noise) const {
+    const auto point = model.about(belief_.x);
+    correction.near_field = model.near_field(point, belief_.P, z, correction.innovation, noise);
+    if (!correction.near_field) {
+      return derived().linearise(model, point, root, z, correction.innovation, a, noise);
     }
-    const Status status = square_root_update<kSize>(belief_, a, noise, correction);
-    if (status != Status::kOk) return status;
-    return math::is_finite(correction.nis) ? Status::kOk : Status::kOverflow;
-  }
-
-  /// Keeps the new belief if the operation that made it went well and it is finite; takes back
-  /// `before` otherwise. (A copy that nobody waits for costs less than one at the end would.)
-  AUVEST_INLINE Status keep(Status status, bool finite, const BeliefType& before) {
-    if (status == Status::kOk && !finite) status = Status::kOverflow;
-    if (status != Status::kOk) belief_ = before;
-    return status;
+    for (int m = 0; m < Model::kSize; ++m) {  // a measurement of the observed states themselves
+      for (int k = 0; k < Model::kObserved; ++k) a(m, k) = k <= m ? root(m, k) : Scalar(0);
+    }
+    return Status::kOk;
   }
 
   Process process_;
   BeliefType belief_;
+  Status check_;
   bool initialised_;
 };
 

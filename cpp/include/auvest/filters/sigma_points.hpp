@@ -37,8 +37,8 @@ struct SigmaPoints {
     using math::sqrt;
     const Scalar scale = Scalar(n) + params.kappa;
     const Scalar c = params.alpha * params.alpha * scale;
-    const bool valid = params.alpha >= Scalar(1e-8) && !(params.alpha > Scalar(1)) &&
-                       is_finite(params.beta) && params.beta >= params.alpha * params.alpha &&
+    const bool valid = math::within(params.alpha, Scalar(1e-8), Scalar(1)) &&
+                       params.beta >= params.alpha * params.alpha && is_finite(params.beta) &&
                        is_finite(params.kappa) && scale > Scalar(0);
     status = valid ? Status::kOk : Status::kBadParameter;
     sqrt_c = valid ? sqrt(c) : Scalar(1);
@@ -50,25 +50,25 @@ struct SigmaPoints {
     fine = c * c < math::machine_epsilon<Scalar>();
   }
 
-  /// The transform about `point`, whose deviations depend on the first O states, with the first O
-  /// columns of the Cholesky factor of P. In: the additive noise covariance (lower triangle) in
-  /// `e`. Out: the rows t_i of `t`, the shift m of the mean, and e + sum s_i s_i' + (beta -
-  /// alpha^2) m m', so that P_yy = t' t + e and P_xy = L t.
-  template <class Point, int N, int O, int M>
-  AUVEST_INLINE void transform(const Point& point, const Matrix<Scalar, N, N>& factor,
-                               Matrix<Scalar, O, M>& t, Vector<Scalar, M>& shift,
+  /// The transform about `point`, whose deviations depend on the first O states, with the root L of
+  /// their covariance. In: the additive noise covariance (lower triangle) in
+  /// `e`. Out: the columns t_i of `t`, the shift m of the mean, and e + sum s_i s_i' + (beta -
+  /// alpha^2) m m', so that P_yy = t t' + e and P_oy = L t'.
+  template <class Point, int O, int M>
+  AUVEST_INLINE void transform(const Point& point, const Matrix<Scalar, O, O>& root,
+                               Matrix<Scalar, M, O>& t, Vector<Scalar, M>& shift,
                                Matrix<Scalar, M, M>& e) const {
     AUVEST_UNROLL
     for (int k = 0; k < O; ++k) {
       Vector<Scalar, O> step;
       AUVEST_UNROLL
-      for (int i = 0; i < O; ++i) step(i) = i < k ? Scalar(0) : sqrt_c * factor(i, k);
+      for (int i = 0; i < O; ++i) step(i) = i < k ? Scalar(0) : sqrt_c * root(i, k);
       Vector<Scalar, M> sum;
       Vector<Scalar, M> difference;
       point.deviations(step, sum, difference);
       AUVEST_UNROLL
       for (int m = 0; m < M; ++m) {
-        t(k, m) = half_sqrt_c * difference(m);  // t_k
+        t(m, k) = half_sqrt_c * difference(m);  // t_k
         sum(m) = half_sqrt_c * sum(m);          // s_k
         shift(m) = k == 0 ? sum(m) : shift(m) + sum(m);
         AUVEST_UNROLL

@@ -2,9 +2,9 @@
 //
 // Sigma points are redrawn from the predicted P before an update. Two exact savings need no second
 // implementation: a linear process is propagated in closed form, and a measurement of the first O
-// states has zero deviations along the other n - O columns of the lower-triangular L, so 2 O points
-// are evaluated instead of 2 n (c keeps the full n). A model without structure takes the same code
-// with O = n and deviations by subtraction.
+// states has zero deviations along the other n - O columns of the lower-triangular root of P, so 2
+// O points are evaluated instead of 2 n (c keeps the full n). A model without structure takes the
+// same code with O = n and deviations by subtraction.
 #pragma once
 
 #include "auvest/filters/gaussian_filter.hpp"
@@ -24,31 +24,27 @@ class Ukf : public GaussianFilter<Ukf<Process>, Process> {
   using Params = typename SigmaPoints<Scalar>::Params;
 
   explicit Ukf(const Process& process, const Params& params = default_params())
-      : Base(process), points_(params, kStates) {}
+      : Ukf(process, SigmaPoints<Scalar>(params, kStates)) {}
 
   Status predict_belief(BeliefType& belief, Scalar dt) const {
     return predict_belief(belief, dt, Linear<Process::kLinear>());
   }
 
-  template <class Model>
-  Status linearise(const Model& model, const State& x, const Covariance& factor,
-                   const typename Model::Measurement& z, typename Model::Measurement& innovation,
-                   Matrix<Scalar, Model::kObserved, Model::kSize>& a,
-                   typename Model::Noise& noise) const {
+  template <class Model, class Point>
+  AUVEST_OUTLINE Status linearise(const Model& model, const Point& point,
+                                  const Matrix<Scalar, Model::kObserved, Model::kObserved>& root,
+                                  const typename Model::Measurement& z,
+                                  typename Model::Measurement& innovation,
+                                  Matrix<Scalar, Model::kSize, Model::kObserved>& a,
+                                  typename Model::Noise& noise) const {
     if (points_.fine && !Model::kClosedForm) return Status::kAlphaTooSmall;
-    const auto point = model.about(x);
     typename Model::Measurement predicted;
-    noise = model.R();
-    points_.transform(point, factor, a, predicted, noise);
+    math::copy(model.R(), noise);
+    points_.transform(point, root, a, predicted, noise);
     AUVEST_UNROLL
     for (int m = 0; m < Model::kSize; ++m) predicted(m) = point.value()(m) + predicted(m);
-    innovation = model.residual(z, predicted);
+    math::copy(model.residual(z, predicted), innovation);
     return Status::kOk;
-  }
-
-  /// kBadParameter if alpha, beta, kappa or a parameter of the process is out of range.
-  Status check() const {
-    return points_.status != Status::kOk ? points_.status : this->process().check();
   }
 
   /// Params() with kappa = 3 - n, which matches the fourth moments of a Gaussian.
@@ -59,6 +55,10 @@ class Ukf : public GaussianFilter<Ukf<Process>, Process> {
   }
 
  private:
+  Ukf(const Process& process, const SigmaPoints<Scalar>& points)
+      : Base(process, points.status != Status::kOk ? points.status : process.check()),
+        points_(points) {}
+
   template <bool>
   struct Linear {};
 
@@ -69,17 +69,18 @@ class Ukf : public GaussianFilter<Ukf<Process>, Process> {
 
   Status predict_belief(BeliefType& belief, Scalar dt, Linear<false>) const {
     if (points_.fine && !Process::kClosedForm) return Status::kAlphaTooSmall;
-    Covariance factor = belief.P;
-    if (!math::partial_cholesky<kStates>(factor)) return Status::kNotPositiveDefinite;
+    Covariance root;
+    Matrix<Scalar, 1, kStates> no_others;
+    if (!math::factor_leading(belief.P, root, no_others)) return Status::kNotPositiveDefinite;
     const auto point = this->process().about(belief.x, dt);
     Covariance t;
     State shift;
     belief.P = this->process().Q(dt);
-    points_.transform(point, factor, t, shift, belief.P);
+    points_.transform(point, root, t, shift, belief.P);
     for (int i = 0; i < kStates; ++i) {
       belief.x(i) = point.value()(i) + shift(i);
       for (int j = 0; j <= i; ++j) {
-        for (int k = 0; k < kStates; ++k) belief.P(i, j) = belief.P(i, j) + t(k, i) * t(k, j);
+        belief.P(i, j) = math::plus_dot(belief.P(i, j), &t(i, 0), &t(j, 0), kStates);
       }
     }
     return Status::kOk;

@@ -48,9 +48,8 @@ struct CovarianceBudget {
   }
 
   Status check() const {
-    const bool valid = params.valid() && math::is_finite(params.position_sigma_m) &&
-                       params.position_sigma_m > Scalar(0);
-    return valid ? Status::kOk : Status::kBadParameter;
+    return params.valid() && math::is_positive(params.position_sigma_m) ? Status::kOk
+                                                                        : Status::kBadParameter;
   }
 
  private:

@@ -13,7 +13,8 @@ struct IntervalLimits {
 
   /// 0 < T_min <= T(0) <= T_max, all finite.
   bool valid() const {
-    return min_s > Scalar(0) && initial_s >= min_s && max_s >= initial_s && math::is_finite(max_s);
+    return math::is_positive(min_s) && math::within(initial_s, min_s, max_s) &&
+           math::is_finite(max_s);
   }
 };
 

@@ -7,6 +7,7 @@
 
 #include "auvest/intervals/interval_limits.hpp"
 #include "auvest/math/basic.hpp"
+#include "auvest/math/linear_algebra.hpp"
 #include "auvest/status.hpp"
 #include "auvest/types.hpp"
 
@@ -72,106 +73,102 @@ struct MahalanobisInterval {
 
   template <class Filter>
   Scalar next(const Filter& filter, const Position& reference) {
-    Position estimate;
-    estimate(0) = filter.x()(0);
-    estimate(1) = filter.x()(1);
-
     Memory& m = memory;
-    m.ratio = trajectory_ratio(estimate, reference);
+    Steps steps;
+    for (int i = 0; i < 2; ++i) {
+      const Scalar estimate = filter.x()(i);
+      steps.a[i] = estimate - m.last_estimate(i);
+      steps.b[i] = reference(i) - m.last_reference(i);
+      steps.c[i] = (estimate - reference(i)) + (m.last_estimate(i) - m.last_reference(i));
+      m.last_estimate(i) = estimate;
+      m.last_reference(i) = reference(i);
+    }
+    const Scalar aa = dot(steps.a, steps.a);
+    const Scalar bb = dot(steps.b, steps.b);
+    m.ratio = clamp(bb / (aa + params.gamma1_m2), Scalar(0), params.ratio_max);  // Eq. (7)
     m.interval =
         clamp((Scalar(1) - m.tau) * params.scale * m.interval + m.tau * m.ratio * params.max_s,
               params.min_s, params.max_s);  // Eq. (8)
-    m.mahalanobis_squared = squared_distance(estimate, reference);
+    m.mahalanobis_squared = squared_distance(steps, aa, bb);
     m.tau = clamp(params.epsilon / (m.mahalanobis_squared + params.gamma2), params.tau_min,
                   params.tau_max);  // Eq. (12), for tau(k+1)
-    m.last_estimate = estimate;
-    m.last_reference = reference;
     return m.interval;
   }
 
   Status check() const {
     const Params& p = params;
-    const bool finite = math::is_finite(p.tau0) && math::is_finite(p.scale) &&
-                        math::is_finite(p.epsilon) && math::is_finite(p.gamma1_m2) &&
-                        math::is_finite(p.gamma2) && math::is_finite(p.ratio_max);
-    const bool tau = p.tau_min > Scalar(0) && p.tau0 >= p.tau_min && p.tau_max >= p.tau0 &&
-                     p.tau_max < Scalar(1);
-    const bool law = !(p.scale < Scalar(0)) && !(p.scale > Scalar(1)) && p.epsilon > Scalar(0) &&
-                     p.gamma1_m2 > Scalar(0) && p.gamma2 > Scalar(0) && p.ratio_max > Scalar(0) &&
-                     !(p.ratio_max > Scalar(1));
-    return finite && p.valid() && tau && law ? Status::kOk : Status::kBadParameter;
+    const Scalar one = Scalar(1);
+    const bool valid = p.valid() && math::is_positive(p.tau_min) &&
+                       math::within(p.tau0, p.tau_min, p.tau_max) && p.tau_max < one &&
+                       math::within(p.scale, Scalar(0), one) && math::is_positive(p.epsilon) &&
+                       math::is_positive(p.gamma1_m2) && math::is_positive(p.gamma2) &&
+                       math::is_positive(p.ratio_max) && !(p.ratio_max > one);
+    return valid ? Status::kOk : Status::kBadParameter;
   }
 
  private:
   /// Not a number counts as low.
-  static Scalar clamp(Scalar value, Scalar low, Scalar high) {
+  AUVEST_OUTLINE static Scalar clamp(Scalar value, Scalar low, Scalar high) {
     if (!(value > low)) return low;
     return value > high ? high : value;
   }
 
-  /// Eq. (7): M(k) = d_t^2 / (d_e^2 + gamma1), at most ratio_max.
-  Scalar trajectory_ratio(const Position& estimate, const Position& reference) const {
-    Scalar desired = Scalar(0);
-    Scalar estimated = Scalar(0);
-    for (int i = 0; i < 2; ++i) {
-      const Scalar d_t = reference(i) - memory.last_reference(i);
-      const Scalar d_e = estimate(i) - memory.last_estimate(i);
-      desired = desired + d_t * d_t;
-      estimated = estimated + d_e * d_e;
-    }
-    return clamp(desired / (estimated + params.gamma1_m2), Scalar(0), params.ratio_max);
+  /// The four points of Eq. (9), X(k), R(k), X(k-1) and R(k-1), without their mean.
+  struct Steps {
+    Scalar a[2];  // X(k) - X(k-1): its length is d_e of Eq. (7)
+    Scalar b[2];  // R(k) - R(k-1): its length is d_t
+    Scalar c[2];  // X(k) + X(k-1) - R(k) - R(k-1)
+  };
+
+  static Scalar dot(const Scalar* u, const Scalar* v) { return math::dot(u, v, 2); }
+  AUVEST_OUTLINE static Scalar cross(const Scalar* u, const Scalar* v) {
+    return u[0] * v[1] - u[1] * v[0];
   }
 
   /// Eqs. (9) to (11): squared Mahalanobis distance of the estimate from the four points.
   ///
-  /// We read the print's (d)_2 as d^2 and take the divisor N - 1 = 3 for cov. With v_i the points
-  /// about their mean, S = sum v_i v_i' / 3, and by Cauchy and Binet
+  /// We read the print's (d)_2 as d^2 and take the divisor N - 1 = 3 for cov. The mean of the four
+  /// points drops out of a / sqrt 2, b / sqrt 2 and c / 2, which are orthogonal contrasts of them:
+  /// 3 S = (a a' + b b') / 2 + c c' / 4, and X(k) - mean = a / 2 + c / 4. By Cauchy and Binet
   ///
-  ///     d^2 = v' S^-1 v = 3 sum_i (v x v_i)^2 / sum_(i<j) (v_i x v_j)^2,
+  ///     d^2 = v' S^-1 v = 3/4 (3 (a x c)^2 + (2 a x b - b x c)^2)
+  ///                           / (2 (a x b)^2 + (a x c)^2 + (b x c)^2),
   ///
   /// sums of squares, in which nothing cancels. S is singular when the points are collinear, as at
   /// the start, where X(0) = R(0), and on noise-free straight legs: epsilon times its trace is
   /// added to its diagonal, which gives the pseudo-inverse's distance along the line there. It is
   /// felt where the points are closer to a line than some sqrt(epsilon) of their spread (1e-3 in
   /// float), and nowhere else. If all four points coincide (or overflow), d^2 = 0.
-  Scalar squared_distance(const Position& estimate, const Position& reference) const {
-    const Position* points[4] = {&estimate, &reference, &memory.last_estimate,
-                                 &memory.last_reference};  // Eq. (9)
-    Scalar v[4][2];
-    Scalar largest = Scalar(0);
-    for (int axis = 0; axis < 2; ++axis) {
-      const Scalar quarter = Scalar(0.25);
-      const Scalar mean =
-          (quarter * (*points[0])(axis) + quarter * (*points[1])(axis)) +
-          (quarter * (*points[2])(axis) + quarter * (*points[3])(axis));  // Eq. (10)
-      for (int i = 0; i < 4; ++i) {
-        v[i][axis] = (*points[i])(axis)-mean;
-        const Scalar size = v[i][axis] < Scalar(0) ? -v[i][axis] : v[i][axis];
-        if (size > largest) largest = size;
-      }
+  static Scalar squared_distance(Steps& s, Scalar aa, Scalar bb) {
+    const Scalar two = Scalar(2);
+    Scalar trace = two * (aa + bb) + dot(s.c, s.c);  // of 12 S
+    // d^2 does not change with the unit of length: take one in which fourth powers fit.
+    if (!(trace > Scalar(1e-8) && trace < Scalar(1e8))) {
+      if (!rescale(s)) return Scalar(0);
+      trace = two * (dot(s.a, s.a) + dot(s.b, s.b)) + dot(s.c, s.c);
     }
-    if (!(largest > Scalar(1e-30)) || !math::is_finite(largest)) return Scalar(0);
+    const Scalar ab = two * cross(s.a, s.b);
+    const Scalar ac = cross(s.a, s.c);
+    const Scalar bc = cross(s.b, s.c);
+    const Scalar reach[2] = {two * s.a[0] + s.c[0], two * s.a[1] + s.c[1]};  // 4 (X(k) - mean)
+    const Scalar ridge = Scalar(0.5) * math::machine_epsilon<Scalar>() * trace;
+    const Scalar form = (Scalar(3) * (ac * ac) + (ab - bc) * (ab - bc)) + ridge * dot(reach, reach);
+    const Scalar determinant = (Scalar(0.5) * (ab * ab) + (ac * ac + bc * bc)) + ridge * trace;
+    return Scalar(0.75) * (form / determinant);  // Eq. (11)
+  }
 
-    // d^2 does not change with the unit of length: take the largest component, against overflow.
-    const Scalar inverse = Scalar(1) / largest;
-    Scalar trace = Scalar(0);
-    for (int i = 0; i < 4; ++i) {
-      for (int axis = 0; axis < 2; ++axis) {
-        v[i][axis] = v[i][axis] * inverse;
-        trace = trace + v[i][axis] * v[i][axis];
-      }
+  /// Makes the largest component 1; false if none is larger than 1e-30, or not all are finite.
+  static bool rescale(Steps& s) {
+    Scalar* const vectors[3] = {s.a, s.b, s.c};
+    Scalar largest = Scalar(1e-30);
+    for (int i = 0; i < 6; ++i) {
+      const Scalar value = vectors[i / 2][i % 2];
+      if (!math::is_finite(value)) return false;
+      const Scalar size = value < Scalar(0) ? -value : value;
+      if (size > largest) largest = size;
     }
-    const Scalar ridge = math::machine_epsilon<Scalar>() * trace;
-    Scalar form = ridge * (v[0][0] * v[0][0] + v[0][1] * v[0][1]);
-    Scalar determinant = ridge * trace;
-    for (int i = 0; i < 4; ++i) {
-      for (int j = i + 1; j < 4; ++j) {
-        const Scalar cross = v[i][0] * v[j][1] - v[i][1] * v[j][0];
-        determinant = determinant + cross * cross;
-        if (i == 0) form = form + cross * cross;
-      }
-    }
-    return Scalar(3) * (form / determinant);  // Eq. (11)
+    for (int i = 0; i < 6; ++i) vectors[i / 2][i % 2] = vectors[i / 2][i % 2] / largest;
+    return largest > Scalar(1e-30);
   }
 };
 

@@ -18,7 +18,7 @@ namespace math {
 namespace detail {
 
 /// wrap() for a float outside [-pi, pi], and for -pi.
-inline float wrap_outside(float a) {
+AUVEST_OUTLINE inline float wrap_outside(float a) {
   const float size = absolute(a);
   if (size <= 9.424777f) {  // 3 pi, rounded down
     // Exact, then one rounding: 2 pi = 6.28318548 - 1.74845553e-07.

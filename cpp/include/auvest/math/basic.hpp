@@ -62,6 +62,24 @@ AUVEST_INLINE bool is_nan(double x) { return x != x; }
 AUVEST_INLINE bool is_finite(float x) { return (to_bits(x) & 0x7f800000u) != 0x7f800000u; }
 AUVEST_INLINE bool is_finite(double x) { return absolute(x) <= DBL_MAX; }
 
+/// True if low <= value <= high; false for a NaN.
+template <class Scalar>
+AUVEST_INLINE bool within(Scalar value, Scalar low, Scalar high) {
+  return value >= low && value <= high;
+}
+
+/// True if 0 <= value, and finite. (In parentheses: Arduino has macros min and max.)
+template <class Scalar>
+AUVEST_INLINE bool is_nonnegative(Scalar value) {
+  return within(value, Scalar(0), (std::numeric_limits<Scalar>::max)());
+}
+
+/// True if 0 < value, not subnormal, and finite.
+template <class Scalar>
+AUVEST_INLINE bool is_positive(Scalar value) {
+  return within(value, (std::numeric_limits<Scalar>::min)(), (std::numeric_limits<Scalar>::max)());
+}
+
 namespace detail {
 
 /// x 2^power for a normal x > 0 and a result below 2^128; rounded once where it is subnormal. By

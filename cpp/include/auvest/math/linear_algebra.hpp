@@ -6,11 +6,57 @@
 // their lower triangle only.
 #pragma once
 
+#include <cstring>
+
 #include "auvest/math/basic.hpp"
 #include "auvest/types.hpp"
 
 namespace auvest {
 namespace math {
+
+/// start + sum_i u[i] v[i], in the order of i.
+template <class Scalar>
+AUVEST_OUTLINE AUVEST_INLINE Scalar plus_dot(Scalar start, const Scalar* u, const Scalar* v,
+                                             int count) {
+  AUVEST_UNROLL
+  for (int i = 0; i < count; ++i) start = start + u[i] * v[i];
+  return start;
+}
+
+/// start - sum_i u[i] v[i], in the order of i.
+template <class Scalar>
+AUVEST_OUTLINE AUVEST_INLINE Scalar minus_dot(Scalar start, const Scalar* u, const Scalar* v,
+                                              int count) {
+  AUVEST_UNROLL
+  for (int i = 0; i < count; ++i) start = start - u[i] * v[i];
+  return start;
+}
+
+/// sum_i u[i] v[i], in the order of i, for count > 0.
+template <class Scalar>
+AUVEST_OUTLINE AUVEST_INLINE Scalar dot(const Scalar* u, const Scalar* v, int count) {
+  return plus_dot(u[0] * v[0], u + 1, v + 1, count - 1);
+}
+
+/// Fills a matrix with zeros.
+template <class Scalar, int Rows, int Cols>
+inline void set_zero(Matrix<Scalar, Rows, Cols>& a) {
+  for (int i = 0; i < Rows; ++i) {
+    for (int j = 0; j < Cols; ++j) a(i, j) = Scalar(0);
+  }
+}
+
+/// to = from. (Eigen's assignment is written out element by element, which takes flash.)
+template <class Scalar, int Rows, int Cols>
+inline void copy(const Matrix<Scalar, Rows, Cols>& from, Matrix<Scalar, Rows, Cols>& to) {
+  std::memcpy(to.data(), from.data(), sizeof(Scalar) * Rows * Cols);
+}
+
+template <class Scalar, int N>
+inline void copy(const Belief<Scalar, N>& from, Belief<Scalar, N>& to) {
+  copy(from.x, to.x);
+  copy(from.P, to.P);
+}
 
 /// Copies the lower triangle onto the upper one.
 template <class Scalar, int N>
@@ -19,6 +65,10 @@ inline void mirror_lower(Matrix<Scalar, N, N>& a) {
     for (int j = 0; j < i; ++j) a(j, i) = a(i, j);
   }
 }
+
+/// Number of rows for what the first o of n components say about the others; at least one, because
+/// there are no empty arrays.
+constexpr int other_states(int n, int o) { return n > o ? n - o : 1; }
 
 /// True if every element is finite.
 template <class Scalar, int Rows, int Cols>
@@ -44,54 +94,84 @@ AUVEST_INLINE bool lower_finite(const Matrix<Scalar, N, N>& a) {
   return finite;
 }
 
-/// The least pivots that are more than rounding noise of an elimination: 4 epsilon of the diagonal.
-/// False if a diagonal element is not positive (or is NaN).
+/// True if all that a belief means is finite.
+template <class Scalar, int N>
+AUVEST_INLINE bool all_finite(const Belief<Scalar, N>& belief) {
+  return all_finite(belief.x) && lower_finite(belief.P);
+}
+
+/// The least pivot that is more than rounding noise of an elimination: 4 epsilon of the diagonal.
+template <class Scalar>
+AUVEST_INLINE Scalar pivot_floor(Scalar diagonal) {
+  return Scalar(4) * machine_epsilon<Scalar>() * diagonal;
+}
+
+/// pivot_floor() of all diagonal elements. False if one is not positive (or is NaN).
 template <class Scalar, int N>
 AUVEST_INLINE bool pivot_floors(const Matrix<Scalar, N, N>& a, Vector<Scalar, N>& floor) {
   AUVEST_UNROLL
   for (int i = 0; i < N; ++i) {
     if (!(a(i, i) > Scalar(0))) return false;
-    floor(i) = Scalar(4) * machine_epsilon<Scalar>() * a(i, i);
+    floor(i) = pivot_floor(a(i, i));
   }
   return true;
 }
 
-/// Columns 0..Cols-1 of the Cholesky factor of the symmetric matrix `a`, in place.
+/// The root of the leading O x O block of the symmetric matrix `p`, and the regression of the other
+/// components on the first O: with p the covariance of (v_o, v_u),
 ///
-/// On return the first `Cols` columns hold L (N x Cols, lower trapezoidal) and the trailing block
-/// its Schur complement, so that a = L L' + [0 0; 0 Schur].
+///     P_oo = root root',   v_u = slope v_o + (what v_o says nothing about),  slope = P_uo P_oo^-1.
 ///
 /// A pivot below its floor is raised to it, which adds a variance the format cannot resolve and
-/// keeps the factor real. The same floor holds for the Schur complement's diagonal. False, with `a`
-/// left unusable, if a diagonal element is not positive (or is NaN).
-template <int Cols, class Scalar, int N>
-inline bool partial_cholesky(Matrix<Scalar, N, N>& a) {
-  static_assert(0 < Cols && Cols <= N, "Cols is the number of columns to eliminate");
-  Vector<Scalar, N> floor;
-  if (!pivot_floors(a, floor)) return false;
+/// keeps the root real. False if a diagonal element of the block is not positive (or is NaN).
+template <int O, int U, class Scalar, int N>
+AUVEST_OUTLINE bool factor_leading(const Matrix<Scalar, N, N>& p, Matrix<Scalar, O, O>& root,
+                                   Matrix<Scalar, U, O>& slope) {
+  static_assert(0 < O && O <= N && U == other_states(N, O), "the first O of N components");
+  Matrix<Scalar, O, O> l;  // P_oo = L D L', unit lower triangular; D on the diagonal for a while
   AUVEST_UNROLL
-  for (int k = 0; k < Cols; ++k) {
-    if (a(k, k) < floor(k)) a(k, k) = floor(k);
-    const Scalar pivot = sqrt(a(k, k));
-    const Scalar inverse = Scalar(1) / pivot;
-    a(k, k) = pivot;
+  for (int i = 0; i < O; ++i) {
     AUVEST_UNROLL
-    for (int i = k + 1; i < N; ++i) a(i, k) = a(i, k) * inverse;
+    for (int j = 0; j <= i; ++j) l(i, j) = p(i, j);
+  }
+  Vector<Scalar, O> floor;
+  if (!pivot_floors(l, floor)) return false;
+  Vector<Scalar, O> inverse;
+  AUVEST_UNROLL
+  for (int k = 0; k < O; ++k) {
+    const Scalar pivot = l(k, k) < floor(k) ? floor(k) : l(k, k);
+    inverse(k) = Scalar(1) / pivot;
+    root(k, k) = sqrt(pivot);
     AUVEST_UNROLL
-    for (int i = k + 1; i < N; ++i) {
+    for (int i = O - 1; i > k; --i) {  // upwards: row i needs the unscaled column above it
+      const Scalar scaled = l(i, k) * inverse(k);
       AUVEST_UNROLL
-      for (int j = k + 1; j <= i; ++j) a(i, j) = a(i, j) - a(i, k) * a(j, k);
+      for (int j = k + 1; j <= i; ++j) l(i, j) = l(i, j) - scaled * l(j, k);
+      l(i, k) = scaled;
+      root(i, k) = scaled * root(k, k);
+      root(k, i) = Scalar(0);
     }
   }
   AUVEST_UNROLL
-  for (int i = Cols; i < N; ++i) {
-    if (a(i, i) < floor(i)) a(i, i) = floor(i);
+  for (int i = O; i < N; ++i) {
+    Vector<Scalar, O> row;
+    AUVEST_UNROLL
+    for (int k = 0; k < O; ++k) {
+      row(k) = minus_dot(p(i, k), &l(k, 0), row.data(), k);
+    }
+    AUVEST_UNROLL
+    for (int k = O - 1; k >= 0; --k) {
+      Scalar value = row(k) * inverse(k);
+      AUVEST_UNROLL
+      for (int j = k + 1; j < O; ++j) value = value - l(j, k) * slope(i - O, j);
+      slope(i - O, k) = value;
+    }
   }
   return true;
 }
 
 /// a = L D L' with a unit lower triangular L, in place: D on the diagonal, L below it. Pivots that
-/// are zero to rounding are floored as in partial_cholesky. False, with `a` left unusable, if `a`
+/// are zero to rounding are floored as in factor_leading. False, with `a` left unusable, if `a`
 /// is indefinite or a diagonal element is not positive (or is NaN).
 template <class Scalar, int N>
 inline bool ldlt(Matrix<Scalar, N, N>& a) {
@@ -117,17 +197,21 @@ inline bool ldlt(Matrix<Scalar, N, N>& a) {
 /// True if the symmetric matrix (lower triangle) is positive definite to working precision: no
 /// pivot of its Cholesky factorisation is lost in rounding noise.
 template <class Scalar, int N>
-inline bool is_positive_definite(Matrix<Scalar, N, N> a) {
-  Vector<Scalar, N> diagonal;
-  for (int i = 0; i < N; ++i) diagonal(i) = a(i, i);
-  for (int k = 0; k < N; ++k) {
-    if (!(a(k, k) > Scalar(N) * machine_epsilon<Scalar>() * diagonal(k)) || !is_finite(a(k, k))) {
+AUVEST_OUTLINE bool is_positive_definite(const Matrix<Scalar, N, N>& a) {
+  Scalar root[N * (N + 1) / 2];  // lower triangle, row after row
+  Scalar* row = root;
+  for (int i = 0; i < N; ++i) {
+    const Scalar* above = root;
+    for (int j = 0; j < i; ++j) {
+      row[j] = minus_dot(a(i, j), row, above, j) / above[j];
+      above += j + 1;
+    }
+    const Scalar pivot = minus_dot(a(i, i), row, row, i);
+    if (!(pivot > Scalar(N) * machine_epsilon<Scalar>() * a(i, i)) || !is_finite(pivot)) {
       return false;
     }
-    const Scalar inverse = Scalar(1) / a(k, k);
-    for (int i = k + 1; i < N; ++i) {
-      for (int j = k + 1; j <= i; ++j) a(i, j) = a(i, j) - a(i, k) * a(j, k) * inverse;
-    }
+    row[i] = sqrt(pivot);
+    row += i + 1;
   }
   return true;
 }

@@ -259,18 +259,14 @@ inline float cos(float x) {
 /// s = sin(x), c = cos(x), the same bits as the two functions.
 inline void sincos(float x, float& s, float& c) {
   const uint32_t size = to_bits(x) & 0x7fffffffu;
-  if (size <= 0x3f490fdbu) {
-    s = size < 0x39800000u ? x : detail::sin_kernel(x);
-    c = detail::cos_kernel(x);
-    return;
-  }
   if (size >= 0x7f800000u) {
     s = quiet_nan();
     c = quiet_nan();
     return;
   }
-  const detail::ReducedAngle r = detail::reduce_quarter(x);
-  const float sine = detail::sin_kernel(r.angle_rad);
+  detail::ReducedAngle r = {x, 0};
+  if (size > 0x3f490fdbu) r = detail::reduce_quarter(x);
+  const float sine = size < 0x39800000u ? x : detail::sin_kernel(r.angle_rad);
   const float cosine = detail::cos_kernel(r.angle_rad);
   const bool odd = (r.quarter & 1u) != 0;
   const float a = odd ? cosine : sine;
@@ -281,7 +277,7 @@ inline void sincos(float x, float& s, float& c) {
 
 /// The angle of the point (x, y) in rad, in [-pi, pi], with C99's results for signed zeros and
 /// infinities. A NaN gives NaN.
-AUVEST_INLINE float atan2(float y, float x) {
+AUVEST_OUTLINE AUVEST_INLINE float atan2(float y, float x) {
   // By octant: pi/2 or pi, in two parts, plus or minus atan(z).
   struct Octant {
     float high, low;
@@ -293,6 +289,9 @@ AUVEST_INLINE float atan2(float y, float x) {
       {3.14159274f, -8.74227766e-08f, 0x80000000u},
       {1.57079637f, -4.37113883e-08f, 0u},
   };
+  static const float kPolynomial[8] = {-3.33331525e-01f, 1.99937671e-01f,  -1.42110020e-01f,
+                                       1.06657691e-01f,  -7.55166039e-02f, 4.32047322e-02f,
+                                       -1.63631924e-02f, 2.91942270e-03f};
   const float size_x = absolute(x);
   const float size_y = absolute(y);
   const float small = size_x < size_y ? size_x : size_y;
@@ -309,11 +308,9 @@ AUVEST_INLINE float atan2(float y, float x) {
     // atan(z) = z + z^3 P(z^2). The terms alternate in sign: added in pairs they stay small.
     const float u = ratio * ratio;
     const float v = u * u;
-    const float p0 = -3.33331525e-01f + u * 1.99937671e-01f;
-    const float p1 = -1.42110020e-01f + u * 1.06657691e-01f;
-    const float p2 = -7.55166039e-02f + u * 4.32047322e-02f;
-    const float p3 = -1.63631924e-02f + u * 2.91942270e-03f;
-    const float p = p0 + v * (p1 + v * (p2 + v * p3));
+    float p = kPolynomial[6] + u * kPolynomial[7];
+    AUVEST_UNROLL
+    for (int i = 4; i >= 0; i -= 2) p = (kPolynomial[i] + u * kPolynomial[i + 1]) + v * p;
     tail = o.low + z * (u * p);
   }
   return copy_sign((o.high + z) + tail, y);

@@ -78,21 +78,26 @@ struct ConstantAcceleration : ProcessModel<ConstantAcceleration<Scalar_, Order>,
 
   /// x <- Phi x, P <- Phi P Phi' + Q in place. Row by row, every element is formed from elements
   /// further down or to the right, which still hold their old values.
-  void propagate(Belief<Scalar, 6>& belief, Scalar dt) const {
+  AUVEST_OUTLINE void propagate(Belief<Scalar, 6>& belief, Scalar dt) const {
     const Coefficients c(dt);
     Covariance& p = belief.P;
     AUVEST_UNROLL
     for (int i = 0; i < 6; ++i) {
+      Scalar row[6];  // of Phi P
+      AUVEST_UNROLL
+      for (int j = 0; j < 6; ++j) {
+        if (j <= i + 2 * Order) row[j] = column(p, i, j, c);
+      }
       AUVEST_UNROLL
       for (int j = 0; j <= i; ++j) {
-        Scalar value = column(p, i, j, c);
-        if (j + 2 < 6) value = value + c.first * column(p, i, j + 2, c);
-        if (Order == 2 && j + 4 < 6) value = value + c.second * column(p, i, j + 4, c);
+        Scalar value = row[j];
+        if (j + 2 < 6) value = value + c.first * row[j + 2];
+        if (Order == 2 && j + 4 < 6) value = value + c.second * row[j + 4];
         p(i, j) = value;
       }
     }
     add_noise(p, dt);
-    belief.x = f(belief.x, dt);
+    math::copy(f(belief.x, dt), belief.x);
   }
 
   /// P_xx + P_yy after dt seconds, without forming the rest of P.
@@ -108,7 +113,8 @@ struct ConstantAcceleration : ProcessModel<ConstantAcceleration<Scalar_, Order>,
   }
 
   Status check() const {
-    return valid(params.position) && valid(params.velocity) && valid(params.acceleration)
+    return math::is_nonnegative(params.position) && math::is_nonnegative(params.velocity) &&
+                   math::is_nonnegative(params.acceleration)
                ? Status::kOk
                : Status::kBadParameter;
   }
@@ -119,8 +125,6 @@ struct ConstantAcceleration : ProcessModel<ConstantAcceleration<Scalar_, Order>,
     Scalar second;  // dt^2 / 2
     explicit Coefficients(Scalar dt) : first(dt), second(Scalar(0.5) * dt * dt) {}
   };
-
-  static bool valid(Scalar density) { return math::is_finite(density) && !(density < Scalar(0)); }
 
   /// Element (i, j) of Phi P, from the lower triangle of P.
   static AUVEST_INLINE Scalar column(const Covariance& p, int i, int j, const Coefficients& c) {

@@ -15,8 +15,11 @@
 //     residual(z, predicted)      z - predicted, wrapped where a component is an angle
 //     about(x)                    an expansion with deviations in closed form
 //     kClosedForm                 true if it does
-//     near_field(belief, z, view) true where h is useless at the scale of the belief; `view` is
-//                                 then the linear measurement to use instead
+//     near_field(point, P, z, innovation, noise)
+//                                 for a model with M = Observed: true where h is useless at the
+//                                 scale of the belief; the filter then takes the measurement as one
+//                                 of the observed states themselves, x_o + innovation, with
+//                                 covariance `noise`. `point` is about(x)
 #pragma once
 
 #include "auvest/math/linear_algebra.hpp"
@@ -24,21 +27,6 @@
 #include "auvest/types.hpp"
 
 namespace auvest {
-
-/// A measurement reduced to its linear form about the belief:
-/// innovation = H (x_true - x)[0:Observed] + noise, noise ~ N(0, R).
-template <class Scalar, int M, int Observed>
-struct LinearView {
-  Vector<Scalar, M> innovation;
-  Matrix<Scalar, M, Observed> H;
-  Matrix<Scalar, M, M> R;
-
-  LinearView() {
-    innovation.setZero();
-    H.setZero();
-    R.setZero();
-  }
-};
 
 template <class Derived, class Scalar_, int N, int M, int Observed = N>
 struct MeasurementModel {
@@ -49,7 +37,6 @@ struct MeasurementModel {
   using Measurement = Vector<Scalar, M>;
   using Noise = Matrix<Scalar, M, M>;
   using Jacobian = Matrix<Scalar, M, Observed>;
-  using View = LinearView<Scalar, M, Observed>;
   static constexpr int kStates = N;
   static constexpr int kSize = M;
   static constexpr int kObserved = Observed;
@@ -92,7 +79,11 @@ struct MeasurementModel {
     return difference;
   }
 
-  bool near_field(const Belief<Scalar, N>&, const Measurement&, View&) const { return false; }
+  template <class Point>
+  bool near_field(const Point&, const Matrix<Scalar, N, N>&, const Measurement&, Measurement&,
+                  Noise&) const {
+    return false;
+  }
 
   Status check() const { return Status::kOk; }
 

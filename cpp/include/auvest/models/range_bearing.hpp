@@ -13,7 +13,8 @@
 //     bearing  d+ - d- = arg((1 + u) conj(1 - u)) = atan2(2 q, w)
 //              d+ + d- = arg((1 + u)(1 - u))      = atan2(-2 p q, 1 - p^2 + q^2)
 // Seen from the station, the segment from D - e to D + e subtends less than pi, so none of these
-// angles needs wrapping.
+// angles needs wrapping. To first order in |u|^2 they are 2 |D| p, |D| q^2, 2 q and -2 p q, and for
+// |u|^2 below epsilon / 4 the difference is lost in rounding.
 //
 // Near the station. Where the spread of the belief reaches the range, neither the slope of the
 // bearing at the mean nor a few points around it describe what was measured; at the station itself
@@ -38,7 +39,6 @@ struct RangeBearing : MeasurementModel<RangeBearing<Scalar_, N>, Scalar_, N, 2, 
   using typename Base::Noise;
   using typename Base::ObservedState;
   using typename Base::State;
-  using typename Base::View;
   static constexpr bool kClosedForm = true;
 
   struct Params {
@@ -56,7 +56,7 @@ struct RangeBearing : MeasurementModel<RangeBearing<Scalar_, N>, Scalar_, N, 2, 
   explicit RangeBearing(const Params& p = Params()) : params(p) {}
 
   struct Expansion {
-    Scalar dx, dy, range, inverse_square;
+    Scalar dx, dy, square, range, inverse_square;
     Measurement centre;
 
     const Measurement& value() const { return centre; }
@@ -76,23 +76,32 @@ struct RangeBearing : MeasurementModel<RangeBearing<Scalar_, N>, Scalar_, N, 2, 
       using math::atan2;
       using math::sqrt;
       const Scalar one = Scalar(1);
-      const Scalar two = Scalar(2);
       const Scalar p = (dx * e(0) + dy * e(1)) * inverse_square;
       const Scalar q = (dx * e(1) - dy * e(0)) * inverse_square;
+      const Scalar two_q = q + q;
+      const Scalar two_range = range + range;
       const Scalar pp = p * p;
       const Scalar qq = q * q;
-      const Scalar w = one - (pp + qq);
+      const Scalar uu = pp + qq;
+      if (uu < Scalar(0.25) * math::machine_epsilon<Scalar>()) {
+        sum(0) = range * qq;
+        difference(0) = two_range * p;
+        sum(1) = -(p * two_q);
+        difference(1) = two_q;
+        return;
+      }
+      const Scalar w = one - uu;
       const Scalar a_plus = sqrt((one + p) * (one + p) + qq);
       const Scalar a_minus = sqrt((one - p) * (one - p) + qq);
       const Scalar a_sum = a_plus + a_minus;
       const Scalar a_product = a_plus * a_minus;
       const bool inside = w > Scalar(0);
-      const Scalar numerator = inside ? Scalar(4) * qq : a_product - w;
-      const Scalar denominator = inside ? (a_product + w) * (a_sum + two) : a_sum + two;
-      sum(0) = two * range * numerator / denominator;  // 2 |D| g / (a+ + a- + 2)
-      difference(0) = Scalar(4) * range * p / a_sum;
-      sum(1) = atan2(-(two * p * q), (one - pp) + qq);
-      difference(1) = atan2(two * q, w);
+      const Scalar numerator = inside ? two_q * two_q : a_product - w;
+      const Scalar denominator = inside ? (a_product + w) * (a_sum + Scalar(2)) : a_sum + Scalar(2);
+      sum(0) = two_range * numerator / denominator;  // 2 |D| g / (a+ + a- + 2)
+      difference(0) = two_range * (p + p) / a_sum;
+      sum(1) = atan2(-(p * two_q), (one - pp) + qq);
+      difference(1) = atan2(two_q, w);
     }
   };
 
@@ -102,9 +111,9 @@ struct RangeBearing : MeasurementModel<RangeBearing<Scalar_, N>, Scalar_, N, 2, 
     Expansion point;
     point.dx = x(0) - params.station_x_m;
     point.dy = x(1) - params.station_y_m;
-    const Scalar square = point.dx * point.dx + point.dy * point.dy;
-    point.range = sqrt(square);
-    point.inverse_square = Scalar(1) / square;
+    point.square = point.dx * point.dx + point.dy * point.dy;
+    point.range = sqrt(point.square);
+    point.inverse_square = Scalar(1) / point.square;
     point.centre(0) = point.range;
     point.centre(1) = atan2(point.dy, point.dx);
     return point;
@@ -141,28 +150,25 @@ struct RangeBearing : MeasurementModel<RangeBearing<Scalar_, N>, Scalar_, N, 2, 
     return difference;
   }
 
-  AUVEST_INLINE bool near_field(const Belief<Scalar, N>& belief, const Measurement& z,
-                                View& view) const {
-    const Scalar dx = belief.x(0) - params.station_x_m;
-    const Scalar dy = belief.x(1) - params.station_y_m;
-    const Scalar square = dx * dx + dy * dy;
-    const Scalar reach = params.near_field * params.near_field * (belief.P(0, 0) + belief.P(1, 1));
-    if (!(square <= reach) && square > Scalar(1e-30)) return false;
-    position_view(dx, dy, z, view);
+  AUVEST_INLINE bool near_field(const Expansion& point, const Matrix<Scalar, N, N>& P,
+                                const Measurement& z, Measurement& innovation, Noise& noise) const {
+    const Scalar reach = params.near_field * params.near_field * (P(0, 0) + P(1, 1));
+    if (!(point.square <= reach) && point.square > Scalar(1e-30)) return false;
+    as_position(point, z, innovation, noise);
     return true;
   }
 
   Status check() const {
     const bool valid = math::is_finite(params.station_x_m) && math::is_finite(params.station_y_m) &&
-                       math::is_finite(params.sigma_range_m) && params.sigma_range_m > Scalar(0) &&
-                       math::is_finite(params.sigma_bearing_rad) &&
-                       params.sigma_bearing_rad > Scalar(0) && math::is_finite(params.near_field) &&
-                       !(params.near_field < Scalar(0));
+                       math::is_positive(params.sigma_range_m) &&
+                       math::is_positive(params.sigma_bearing_rad) &&
+                       math::is_nonnegative(params.near_field);
     return valid ? Status::kOk : Status::kBadParameter;
   }
 
  private:
-  void position_view(Scalar dx, Scalar dy, const Measurement& z, View& view) const {
+  AUVEST_OUTLINE void as_position(const Expansion& point, const Measurement& z,
+                                  Measurement& innovation, Noise& noise) const {
     Scalar sine, cosine;
     math::sincos(z(1), sine, cosine);
     const Scalar range2 = z(0) * z(0);
@@ -170,13 +176,11 @@ struct RangeBearing : MeasurementModel<RangeBearing<Scalar_, N>, Scalar_, N, 2, 
     const Scalar var_bearing = params.sigma_bearing_rad * params.sigma_bearing_rad;
     const Scalar along = var_range + Scalar(0.75) * range2 * var_bearing * var_bearing;
     const Scalar across = (range2 + var_range) * var_bearing;
-    view.innovation(0) = z(0) * cosine - dx;
-    view.innovation(1) = z(0) * sine - dy;
-    view.H(0, 0) = view.H(1, 1) = Scalar(1);
-    view.H(0, 1) = view.H(1, 0) = Scalar(0);
-    view.R(0, 0) = along * cosine * cosine + across * sine * sine;
-    view.R(1, 0) = view.R(0, 1) = (along - across) * cosine * sine;
-    view.R(1, 1) = along * sine * sine + across * cosine * cosine;
+    innovation(0) = z(0) * cosine - point.dx;
+    innovation(1) = z(0) * sine - point.dy;
+    noise(0, 0) = along * cosine * cosine + across * sine * sine;
+    noise(1, 0) = noise(0, 1) = (along - across) * cosine * sine;
+    noise(1, 1) = along * sine * sine + across * cosine * cosine;
   }
 };
 
