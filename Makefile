@@ -14,9 +14,13 @@ export CTEST_OUTPUT_ON_FAILURE := 1
 
 # What Debian provides: to build and run, and beyond that to test and lint.
 PACKAGES := g++ cmake ninja-build libeigen3-dev python3-dev python3-venv
-DEV_PACKAGES := $(PACKAGES) clang libclang-rt-dev doctest-dev clang-format valgrind
+FIRMWARE_PACKAGES := arduino-builder arduino-core-avr gcc-avr avr-libc binutils-avr \
+    simavr libsimavr-dev libelf-dev \
+    gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib qemu-system-arm
+DEV_PACKAGES := $(PACKAGES) $(FIRMWARE_PACKAGES) \
+    clang libclang-rt-dev doctest-dev clang-format valgrind
 
-CXX_FILES = $(shell find cpp tests/cpp -name '*.hpp' -o -name '*.cpp')
+CXX_FILES = $(shell find cpp firmware tests -name '*.hpp' -o -name '*.cpp' -o -name '*.h')
 # What the Python module is compiled from.
 CORE_FILES := pyproject.toml CMakeLists.txt $(shell find cpp/include cpp/bindings cpp/cmake -type f)
 
@@ -66,7 +70,7 @@ $(VENV)/.auvest-editable: $(VENV)/.auvest-setup-dev $(CORE_FILES)
 
 # ---- Use -----------------------------------------------------------------------------------------
 
-.PHONY: demo reproduce wheel
+.PHONY: demo reproduce wheel library
 demo: install ## install and run the first simulation: a table and the path of a figure
 	$(VENV)/bin/auvest simulate aukf
 
@@ -77,13 +81,31 @@ wheel: setup ## a wheel of the package in dist/
 	$(PY) -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .
 	@ls dist/*.whl
 
+library: setup-dev ## the Arduino library: a zip in dist/
+	$(PY) -m firmware.package --output dist
+
+# The simulated board, and the sketch tracking_loop compiled for it.
+.PHONY: board capture
+board: library ## the simulated MEGA2560 and the sketch tracking_loop for it, in build/
+	cmake -S . -B build/firmware --log-level=WARNING -D AUVEST_BUILD_FIRMWARE=ON
+	cmake --build build/firmware
+	$(PY) -m firmware.sketch firmware/library/examples/tracking_loop \
+	    --library dist/auvest-*.zip --output build/sketch
+
+capture: board install ## run tracking_loop on the simulated board: table and picture of the track
+	AUVEST_BOARD=build/firmware/firmware/board/auvest-board $(VENV)/bin/auvest capture \
+	    --simulator build/sketch/tracking_loop/tracking_loop.ino.elf
+
 # ---- Test ----------------------------------------------------------------------------------------
 
-.PHONY: test test-cpp test-cpp-matrix test-python
-test: test-python test-cpp test-cpp-matrix ## all tests
+.PHONY: test test-cpp test-cpp-matrix test-firmware test-python
+test: test-python test-firmware test-cpp test-cpp-matrix ## all tests
 
 test-python: install-editable ## the Python tests
-	$(PY) -m pytest
+	$(PY) -m pytest tests/python
+
+test-firmware: install-editable ## the library, the sketches on the simulated board, parity
+	$(PY) -m pytest tests/firmware tests/parity
 
 test-cpp: build-release ## the C++ tests, optimised, with the examples
 	ctest --test-dir build/release

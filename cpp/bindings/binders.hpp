@@ -27,6 +27,7 @@ void bind_sigma_points(py::module_& m);
 void bind_ekf(py::module_& m);
 void bind_ukf(py::module_& m);
 void bind_tracking(py::module_& m);
+void bind_self_test(py::module_& m);
 
 template <class Scalar>
 struct Precision;

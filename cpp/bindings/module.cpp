@@ -14,4 +14,5 @@ PYBIND11_MODULE(_core, m) {
   bind_tracking(m);
   bind_ekf(m);
   bind_ukf(m);
+  bind_self_test(m);
 }

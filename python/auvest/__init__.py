@@ -7,7 +7,7 @@ SI units, angles in rad; bearings from +x towards +y.
 from __future__ import annotations
 
 from auvest import metrics, scenarios
-from auvest._core import Status
+from auvest._core import SelfTestPart, SelfTestResult, Status, self_test
 from auvest.commands.version import version
 from auvest.errors import FilterError
 from auvest.filters import Aukf, Ekf, RunResult, Ukf
@@ -24,10 +24,13 @@ __all__ = [
     "MahalanobisInterval",
     "RangeBearing",
     "RunResult",
+    "SelfTestPart",
+    "SelfTestResult",
     "Status",
     "Ukf",
     "metrics",
     "scenarios",
+    "self_test",
 ]
 
 __version__ = version()

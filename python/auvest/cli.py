@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from auvest.commands import reproduce_aukf, reproduce_intervals, simulate_aukf
+from auvest.commands import capture, reproduce_aukf, reproduce_intervals, simulate_aukf
 from auvest.commands.console import EXIT_CODES
 from auvest.commands.version import version
 
@@ -36,6 +36,8 @@ First steps:
 
   auvest reproduce intervals         the interval policies at equal sampling rate
 
+  auvest capture --help              record what a board reports, real or simulated
+
 {EXIT_CODES}
 """,
 )
@@ -49,6 +51,7 @@ reproduce = typer.Typer(
 app.add_typer(simulate)
 app.add_typer(reproduce)
 
+app.command("capture", help=capture.HELP)(capture.command)
 simulate.command("aukf", help=simulate_aukf.HELP)(simulate_aukf.command)
 reproduce.command("aukf", help=reproduce_aukf.HELP)(reproduce_aukf.command)
 reproduce.command("intervals", help=reproduce_intervals.HELP)(reproduce_intervals.command)

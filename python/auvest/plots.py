@@ -191,6 +191,73 @@ def simulation_figure(
     return figure
 
 
+def capture_figure(
+    estimate: Floats,
+    desired: Floats,
+    observed: Floats,
+    truth: Floats,
+    *,
+    station: Sequence[float],
+    time_s: Floats,
+    interval_s: Floats,
+    sigma_m: Floats,
+    nis: Floats,
+    title: str,
+) -> Figure:
+    """Draw one recording of ``auvest capture``: tracks, interval, uncertainty and consistency.
+
+    Parameters
+    ----------
+    estimate, desired, observed, truth : ndarray, shape (T, 2)
+        Positions, m; NaN where unknown.
+    station : (float, float)
+        Position of the base station, m.
+    time_s, interval_s, sigma_m, nis : ndarray, shape (T,)
+        Time of the samples, interval to the next (s), standard deviation of the position (m) and
+        normalised innovation squared; NaN where the measurement is missing.
+    title : str
+        Title of the whole.
+    """
+    figure = new_figure((10.0, 6.0), title)
+    grid = figure.add_gridspec(3, 2, width_ratios=(1.0, 1.25))
+    plane = figure.add_subplot(grid[:, 0])
+    plane.plot(*observed.T, ".", color=GREY, markersize=4, alpha=0.8, label="observed")
+    plane.plot(*desired.T, "-", color=SKY, linewidth=1.6, label="desired")
+    if np.isfinite(truth).any():
+        plane.plot(*truth.T, "-", color=BLACK, linewidth=1.2, label="truth")
+    plane.plot(*estimate.T, "--", color=BLUE, linewidth=1.8, label="estimate")
+    plane.plot(*station, "^", color=GREEN, markersize=8, label="station", linestyle="none")
+    plane.set(xlabel="x / m", ylabel="y / m")
+    plane.set_aspect("equal", adjustable="datalim")
+    style(plane)
+    plane.set_title("tracks", loc="left")
+    _legend_inside(plane)
+
+    rows = (
+        ("interval to the next sample", "T / s", interval_s),
+        ("standard deviation of the position", "sigma / m", sigma_m),
+        ("normalised innovation squared, 95 % below 5.99", "NIS", nis),
+    )
+    missing = time_s[~np.isfinite(nis)]
+    for row, (name, label, values) in enumerate(rows):
+        axes = figure.add_subplot(grid[row, 1])
+        axes.plot(time_s, values, ".-", color=BLUE, linewidth=1.2, markersize=3.5)
+        axes.set_ylabel(label)
+        axes.set_ylim(bottom=0.0)
+        axes.set_title(name, loc="left")
+        axes.title.set_fontsize(10.5)
+        if row == 2:
+            axes.axhline(5.99, color=BLACK, linewidth=0.8, linestyle="--")
+            axes.plot(missing, np.zeros_like(missing), "|", color=VERMILION, label="missed")
+            if missing.size:
+                _legend_inside(axes)
+            axes.set_xlabel("time / s")
+        else:
+            axes.tick_params(labelbottom=False)
+        style(axes)
+    return figure
+
+
 def save(figure: Figure, path: Path) -> Path:
     """Write a figure as PNG, the same bytes for the same figure, and return the path."""
     figure.savefig(path, format="png", dpi=DPI, metadata={"Software": None})

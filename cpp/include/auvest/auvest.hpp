@@ -14,3 +14,4 @@
 #include "auvest/models/constant_acceleration.hpp"
 #include "auvest/models/linear.hpp"
 #include "auvest/models/range_bearing.hpp"
+#include "auvest/self_test.hpp"

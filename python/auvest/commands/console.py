@@ -123,6 +123,14 @@ def _plain(value: Any) -> Any:
     return value
 
 
+def refuse_given(ctx: typer.Context, names: tuple[str, ...], why: str) -> None:
+    """Refuse options that were given and would do nothing."""
+    for name in names:
+        source = ctx.get_parameter_source(name)
+        if source is not None and source.name != "DEFAULT":
+            raise typer.BadParameter(why, param_hint=f"'--{name.replace('_', '-')}'")
+
+
 def positive(value: float | None) -> float | None:
     """Option callback: a finite number above zero."""
     if value is not None and not (math.isfinite(value) and value > 0):

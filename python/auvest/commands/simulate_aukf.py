@@ -20,7 +20,7 @@ from auvest import (
     metrics,
 )
 from auvest.commands import console
-from auvest.commands.console import EXIT_CODES, ExitCode, Terminal
+from auvest.commands.console import EXIT_CODES, ExitCode, Terminal, refuse_given
 from auvest.commands.files import write_csv
 from auvest.commands.version import version
 from auvest.intervals import IntervalPolicy
@@ -204,7 +204,7 @@ def command(
     """Simulate; the help text is :data:`HELP`."""
     terminal = Terminal(as_json=as_json, quiet=quiet)
     if filter_name == "ekf":
-        _refuse_given(
+        refuse_given(
             ctx, ("alpha", "beta", "kappa"), "belongs to --filter ukf or aukf, not to ekf."
         )
     policy = _interval_policy(
@@ -298,14 +298,6 @@ def command(
             f"after {int(result.samples[first])} steps: {Status(int(result.status[first])).name}",
             ExitCode.FAILED,
         )
-
-
-def _refuse_given(ctx: typer.Context, names: tuple[str, ...], why: str) -> None:
-    """Refuse options that were given and would do nothing."""
-    for name in names:
-        source = ctx.get_parameter_source(name)
-        if source is not None and source.name != "DEFAULT":
-            raise typer.BadParameter(why, param_hint=f"'--{name}'")
 
 
 def _interval_policy(

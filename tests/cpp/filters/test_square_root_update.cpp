@@ -51,8 +51,7 @@ void check_against_textbook() {
     REQUIRE(auvest::math::factor_leading(p, l, slope));
     Matrix<double, M, O> a = h * l;
     Matrix<double, M, M> used_noise = noise;
-    REQUIRE(auvest::square_root_update(belief, l, slope, a, used_noise, correction) ==
-            Status::kOk);
+    REQUIRE(auvest::square_root_update(belief, l, slope, a, used_noise, correction) == Status::kOk);
 
     const Matrix<double, M, M> s = full * p * full.transpose() + noise;
     const Matrix<double, N, M> gain = p * full.transpose() * s.inverse();

@@ -1,0 +1,1 @@
+"""auvest on a microcontroller: the Arduino library, sketches, the simulated board."""

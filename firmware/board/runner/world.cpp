@@ -1,0 +1,81 @@
+#include "world.hpp"
+
+#include <cmath>
+#include <fstream>
+#include <iostream>
+#include <sstream>
+#include <stdexcept>
+#include <utility>
+
+namespace auvest_board {
+
+namespace {
+
+bool starts_with(const std::string& text, const std::string& prefix) {
+  return text.compare(0, prefix.size(), prefix) == 0;
+}
+
+}  // namespace
+
+AnswersWorld::AnswersWorld(const std::string& path, std::string request, uint32_t frequency)
+    : request_(std::move(request)) {
+  std::ifstream file(path);
+  if (!file) throw std::runtime_error("cannot read " + path);
+  std::string row;
+  for (int number = 1; std::getline(file, row); ++number) {
+    if (!row.empty() && row.back() == '\r') row.pop_back();
+    if (row == "delay_ms,text" || row.empty()) continue;
+    std::istringstream fields(row);
+    double delay_ms = 0;
+    char comma = 0;
+    if (!(fields >> delay_ms >> comma) || comma != ',' || !(delay_ms >= 0)) {
+      throw std::runtime_error(path + ":" + std::to_string(number) + ": expected delay_ms,text");
+    }
+    answers_.push_back(
+        {Cycle(std::llround(delay_ms * 1e-3 * frequency)), row.substr(row.find(',') + 1)});
+  }
+}
+
+Reaction AnswersWorld::react(const Event& event) {
+  Reaction reaction;
+  if (event.kind == Event::Kind::kLine && starts_with(event.text, request_) &&
+      next_ < answers_.size()) {
+    const Message& answer = answers_[next_++];
+    if (!answer.text.empty()) reaction.messages.push_back(answer);
+  }
+  return reaction;
+}
+
+Reaction InteractiveWorld::react(const Event& event) {
+  switch (event.kind) {
+    case Event::Kind::kStart:
+      std::cout << "start " << event.cycle;
+      break;
+    case Event::Kind::kLine:
+      std::cout << "line " << event.cycle << ' ' << event.text;
+      break;
+    case Event::Kind::kPin:
+      std::cout << "pin " << event.cycle << ' ' << event.text << ' ' << event.level;
+      break;
+  }
+  std::cout << std::endl;
+
+  Reaction reaction;
+  std::string command;
+  while (std::getline(std::cin, command)) {
+    if (command == "go") return reaction;
+    if (command == "stop") break;
+    std::istringstream words(command);
+    std::string verb;
+    Message message{};
+    if (!(words >> verb >> message.delay) || verb != "send" || words.get() != ' ') {
+      throw std::runtime_error("--interactive: unknown command: " + command);
+    }
+    std::getline(words, message.text);
+    reaction.messages.push_back(std::move(message));
+  }
+  reaction.stop = true;
+  return reaction;
+}
+
+}  // namespace auvest_board

@@ -1,0 +1,416 @@
+"""Measure what auvest takes on the chip: flash, RAM, stack and cycles, on the simulated board.
+
+    python -m firmware.budgets            compare with firmware/budgets.csv
+    python -m firmware.budgets --write    write firmware/budgets.csv and docs/budgets.md anew
+
+Every program is a sketch, compiled as the Arduino IDE does, with the library from its zip. Cycles
+of the simulated chip are exact: the same program takes the same number each time.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import os
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from auvest import telemetry
+from auvest.board import Board, BoardError, SerialLine
+from auvest.scenarios.paper_aukf import FilterName, paper_filter, paper_noise
+from auvest.scenarios.tracking import Scenario, Track, simulate
+from firmware.package import PackageError, package
+from firmware.sketch import Compiled, SketchError, compile_sketch
+
+ROOT = Path(__file__).resolve().parents[1]
+BUDGETS = ROOT / "firmware" / "budgets.csv"
+PAGE = ROOT / "docs" / "budgets.md"
+EXAMPLES = ROOT / "firmware" / "library" / "examples"
+
+TARGET = "atmega2560"
+
+#: Growth beyond this share of a committed figure is refused.
+TOLERANCE = 0.02
+
+#: Steps that each filter is measured over. The vehicle reaches every bearing and the near field.
+STEPS = {"ekf": 1_000, "ukf": 1_000, "aukf": 10_000, "aukf_covariance_budget": 1_000}
+
+COLUMNS = (
+    "target",
+    "program",
+    "flash_bytes",
+    "static_ram_bytes",
+    "stack_bytes",
+    "cycles_min",
+    "cycles_median",
+    "cycles_max",
+)
+
+
+class BudgetError(RuntimeError):
+    """A figure has grown, or a program could not be measured; the message says which."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """What one program takes.
+
+    Attributes
+    ----------
+    flash_bytes, static_ram_bytes : int
+        As the Arduino IDE reports them: code and constants; .data, .bss and .noinit.
+    stack_bytes : int
+        Deepest stack of the whole run, interrupts included, from the end of the RAM.
+    cycles_min, cycles_median, cycles_max : int or None
+        Of one step; None where a program has no steps.
+    """
+
+    target: str
+    program: str
+    flash_bytes: int
+    static_ram_bytes: int
+    stack_bytes: int
+    cycles_min: int | None
+    cycles_median: int | None
+    cycles_max: int | None
+
+
+# ---- The programs --------------------------------------------------------------------------------
+
+_EMPTY = """\
+void setup() {}
+void loop() {}
+"""
+
+# A filter at work and nothing else: measurements come in, and the estimate stays where it is.
+_FILTER = """\
+#include <auvest.h>
+
+#include "board.hpp"
+
+using Process = auvest::EulerAcceleration<float>;
+using Filter = @FILTER@;
+static_assert(sizeof(Filter) <= 320, "more RAM than promised");
+
+auvest::Ukf<Process> make_ukf() {
+  auvest::Ukf<Process>::Params points = auvest::Ukf<Process>::default_params();
+  points.alpha = 1e-6f;
+  return auvest::Ukf<Process>(Process(), points);
+}
+
+Filter filter{@MAKE@};
+const auvest::RangeBearing<float, 6> sonar;
+
+float next() {
+  uint32_t bits = 0;
+  for (uint8_t i = 0; i < 4; ++i) bits = bits >> 8 | static_cast<uint32_t>(board::read()) << 24;
+  return auvest::math::from_bits(bits);
+}
+
+auvest::Status step(const auvest::Vector<float, 2>& z, const auvest::Vector<float, 2>& desired) {
+  @STEP@
+}
+
+void setup() {
+  Filter::State x;
+  Filter::Covariance P;
+  auvest::math::set_zero(P);
+  for (uint8_t i = 0; i < 6; ++i) x(i) = next();
+  for (uint8_t i = 0; i < 6; ++i) P(i, i) = next();
+  if (filter.reset(x, P) != auvest::Status::kOk) board::fail();
+}
+
+void loop() {
+  auvest::Vector<float, 2> z;
+  auvest::Vector<float, 2> desired;
+  z(0) = next();
+  z(1) = next();
+  desired(0) = next();
+  desired(1) = next();
+  if (auvest::math::is_nan(z(0))) board::finish();
+  board::begin(1);
+  const auvest::Status status = step(z, desired);
+  board::end(1);
+  if (status != auvest::Status::kOk) board::fail();
+}
+"""
+
+_FIXED_STEP = """auvest::Status status = filter.predict(0.5f);
+  if (status == auvest::Status::kOk) status = filter.update(z, sonar).status;
+  return status;"""
+_ADAPTIVE_STEP = """auvest::Status status = filter.predict(filter.interval());
+  if (status == auvest::Status::kOk) status = filter.update(z, sonar).status;
+  if (status == auvest::Status::kOk) status = filter.feedback(desired);
+  return status;"""
+
+#: Program, type, constructor's argument and step of each filter.
+_FILTERS: Mapping[str, tuple[str, str, str]] = {
+    "ekf": ("auvest::Ekf<Process>", "Process()", _FIXED_STEP),
+    "ukf": ("auvest::Ukf<Process>", "make_ukf()", _FIXED_STEP),
+    "aukf": ("auvest::Aukf<Process>", "make_ukf()", _ADAPTIVE_STEP),
+    "aukf_covariance_budget": (
+        "auvest::Aukf<Process, auvest::CovarianceBudget<float>>",
+        "make_ukf()",
+        _ADAPTIVE_STEP,
+    ),
+}
+
+
+def _source(program: str) -> str:
+    kind, make, step = _FILTERS[program]
+    return _FILTER.replace("@FILTER@", kind).replace("@MAKE@", make).replace("@STEP@", step)
+
+
+def _record(program: str) -> bytes:
+    """Start, variances and the steps of a vehicle that circles through the station."""
+    names: Mapping[str, FilterName] = {"ekf": "ekf", "ukf": "ukf"}
+    name = names.get(program, "aukf")
+    filter_ = paper_filter(name, noise=paper_noise("normal"), track="turn", dtype="float32")
+    scenario = Scenario(
+        track=Track(kind="turn", turn_rate=0.05, wander_m=0.2),
+        noise=paper_noise("normal"),
+        steps=STEPS[program],
+        runs=1,
+    )
+    start = np.concatenate([filter_.x, np.diagonal(filter_.P)])
+    result = simulate(filter_, scenario, workers=1)
+    rows = np.hstack([result.z[0], result.truth[0]])
+    end = np.full(4, np.nan)
+    return np.concatenate([start, rows.ravel(), end]).astype("<f4").tobytes()
+
+
+# ---- Measure -------------------------------------------------------------------------------------
+
+
+def measure(output: Path) -> list[Row]:
+    """Compile all programs and run them on the simulated board.
+
+    Parameters
+    ----------
+    output : Path
+        A folder for what is built.
+
+    Returns
+    -------
+    list of Row
+        `empty`, the filters, the examples.
+    """
+    library = package(output)
+    programs: dict[str, Callable[[Compiled, Path], Row]] = {"empty": _run_empty}
+    programs.update(dict.fromkeys(_FILTERS, _run_filter))
+    programs["first_steps"] = _run_first_steps
+    programs["replay"] = _run_replay
+    programs["tracking_loop"] = _run_tracking_loop
+    compiled = {}
+    for program in programs:  # one after the other: they share Arduino's core
+        folder = output / "sketches" / program
+        shutil.rmtree(folder, ignore_errors=True)
+        if (EXAMPLES / program).is_dir():
+            shutil.copytree(EXAMPLES / program, folder)
+        else:
+            folder.mkdir(parents=True)
+            source = _EMPTY if program == "empty" else _source(program)
+            (folder / f"{program}.ino").write_text(source, encoding="utf-8")
+            shutil.copy(ROOT / "firmware" / "board" / "board.hpp", folder)
+        compiled[program] = compile_sketch(folder, library, output / "compiled")
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        runs = {
+            program: pool.submit(run, compiled[program], output / "sketches" / program)
+            for program, run in programs.items()
+        }
+        return [run.result() for run in runs.values()]
+
+
+def _row(program: str, compiled: Compiled, stack_bytes: int, cycles: list[int]) -> Row:
+    low, median, high = (
+        (min(cycles), int(np.median(cycles)), max(cycles)) if cycles else (None, None, None)
+    )
+    return Row(TARGET, program, compiled.flash, compiled.ram, stack_bytes, low, median, high)
+
+
+def _run_empty(compiled: Compiled, folder: Path) -> Row:
+    with Board(compiled.elf, for_s=0.1) as board:
+        report = board.run()
+    return _row(folder.name, compiled, report.stack_bytes, [])
+
+
+def _run_filter(compiled: Compiled, folder: Path) -> Row:
+    record = folder / "record.bin"
+    record.write_bytes(_record(folder.name))
+    with Board(compiled.elf, input=record, limit_s=1000.0) as board:
+        report = board.run()
+    step = report.sections[1]
+    if step.count != STEPS[folder.name]:
+        raise BudgetError(f"{folder.name}: {step.count} steps instead of {STEPS[folder.name]}")
+    row = _row(folder.name, compiled, report.stack_bytes, [])
+    return Row(
+        **{
+            **vars(row),
+            "cycles_min": step.minimum,
+            "cycles_median": step.median,
+            "cycles_max": step.maximum,
+        }
+    )
+
+
+def _run_first_steps(compiled: Compiled, folder: Path) -> Row:
+    """Measure one run; its cycles are those until its last line is through."""
+    with Board(compiled.elf, for_s=1.0) as board:
+        lines = [event for event in board if isinstance(event, SerialLine)]
+    return _row(folder.name, compiled, board.report.stack_bytes, [lines[-1].cycle])
+
+
+def _run_replay(compiled: Compiled, folder: Path) -> Row:
+    """Measure one run; the sketch counts its cycles itself, in eights."""
+    with Board(compiled.elf, for_s=2.0) as board:
+        lines = [event.text for event in board if isinstance(event, SerialLine)]
+    cycles = [int(line.rsplit(",", 1)[1]) for line in lines if line[:1].isdigit()]
+    return _row(folder.name, compiled, board.report.stack_bytes, cycles)
+
+
+def _run_tracking_loop(compiled: Compiled, folder: Path) -> Row:
+    """Measure 60 samples of a vehicle at rest: the cycles awake, by the sketch's own clock."""
+    reader = telemetry.Reader()
+    rows: list[telemetry.Row] = []
+    with Board(compiled.elf, limit_s=120.0) as board:
+        for event in board:
+            if not isinstance(event, SerialLine):
+                continue
+            row = reader.read(event.text)
+            if row is not None:
+                rows.append(row)
+            if len(rows) == 60:
+                break
+            sample = telemetry.requested_sample(event.text)
+            if sample is not None:
+                board.send(telemetry.answer(sample, 5.0, 0.5), delay_s=0.01)
+    cycles = [round(row["awake_us"] * 16) for row in rows]
+    return _row(folder.name, compiled, board.report.stack_bytes, cycles)
+
+
+# ---- Compare and write ---------------------------------------------------------------------------
+
+
+def read_budgets(path: Path = BUDGETS) -> list[Row]:
+    """Read the committed figures."""
+    with path.open(newline="", encoding="utf-8") as file:
+        return [
+            Row(
+                line["target"],
+                line["program"],
+                *(int(line[name]) for name in COLUMNS[2:5]),
+                *(int(line[name]) if line[name] else None for name in COLUMNS[5:]),
+            )
+            for line in csv.DictReader(file)
+        ]
+
+
+def growth(measured: list[Row], committed: list[Row]) -> list[str]:
+    """Say what has grown beyond the tolerance, or is not in both lists; one line each."""
+    before = {(row.target, row.program): row for row in committed}
+    lines = []
+    for row in measured:
+        old = before.pop((row.target, row.program), None)
+        if old is None:
+            lines.append(f"{row.target} {row.program}: not in {BUDGETS.name}")
+            continue
+        for name in COLUMNS[2:]:
+            now, was = getattr(row, name), getattr(old, name)
+            if (now is None) != (was is None):
+                lines.append(f"{row.target} {row.program} {name}: {now} instead of {was}")
+            elif now is not None and now > was * (1 + TOLERANCE):
+                lines.append(
+                    f"{row.target} {row.program} {name}: {now:,} instead of {was:,} "
+                    f"(+{now / was - 1:.1%}, at most {TOLERANCE:.0%})"
+                )
+    lines += [f"{target} {program}: no longer measured" for target, program in before]
+    return lines
+
+
+def write_budgets(rows: list[Row], path: Path = BUDGETS) -> None:
+    """Write the table that is committed."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(COLUMNS)
+        for row in rows:
+            writer.writerow("" if value is None else value for value in vars(row).values())
+
+
+def page(rows: list[Row]) -> str:
+    """Return the page of the documentation."""
+    empty = next(row for row in rows if row.program == "empty")
+    lines = [
+        "# What it takes on the chip",
+        "",
+        "Written by `python -m firmware.budgets --write`; the tests measure again and refuse",
+        f"growth beyond {TOLERANCE:.0%}. ATmega2560 at 16 MHz, simulated; every program is a",
+        "sketch, compiled with the Arduino IDE's own options (-Os -flto, avr-gcc of Debian).",
+        "",
+        "| program | flash | above the empty sketch | static RAM | stack | cycles per step: min "
+        "| median | max | median at 16 MHz |",
+        "|---|---:|---:|---:|---:|---:|---:|---:|---:|",
+    ]
+    for row in rows:
+        cells = [f"`{row.program}`", f"{row.flash_bytes:,}"]
+        cells += [f"{row.flash_bytes - empty.flash_bytes:,}"]
+        cells += [f"{row.static_ram_bytes:,}", f"{row.stack_bytes:,}"]
+        cycles = (row.cycles_min, row.cycles_median, row.cycles_max)
+        cells += ["" if value is None else f"{value:,}" for value in cycles]
+        cells += ["" if row.cycles_median is None else f"{row.cycles_median / 16e3:.2f} ms"]
+        lines.append(f"| {' | '.join(cells)} |")
+    lines += [
+        "",
+        "`ekf` and `ukf`: predict and update; `aukf` and `aukf_covariance_budget`: with the",
+        "interval feedback (the paper's law; the covariance budget). Six states, float, the",
+        f"paper's model, alpha = 1e-6, range and bearing, {STEPS['ekf']:,} steps (`aukf`:",
+        f"{STEPS['aukf']:,}); the vehicle circles through the station, so the near field and every",
+        "bearing occur. The examples: `first_steps` is its",
+        "whole run, serial text included; `replay` counts predict, update and feedback by the",
+        "chip's timer; `tracking_loop` counts the cycles awake between two samples, serial text",
+        "included.",
+        "",
+        "Flash and static RAM are what the IDE reports (bytes); the stack is the deepest of the",
+        "whole run from the end of the RAM, interrupts included.",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def main() -> int:
+    """Run the command line."""
+    parser = argparse.ArgumentParser(
+        prog="firmware.budgets",
+        description="Measure flash, RAM, stack and cycles of every program on the simulated chip, "
+        "and compare them with firmware/budgets.csv. The simulated board must be built: "
+        "cmake -S . -B build/firmware -D AUVEST_BUILD_FIRMWARE=ON && cmake --build build/firmware; "
+        "then set AUVEST_BOARD to the path of auvest-board.",
+    )
+    parser.add_argument(
+        "--write", action="store_true", help="write firmware/budgets.csv and docs/budgets.md anew"
+    )
+    arguments = parser.parse_args()
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            rows = measure(Path(folder))
+    except (BoardError, BudgetError, PackageError, SketchError, FileNotFoundError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    if arguments.write:
+        write_budgets(rows)
+        PAGE.write_text(page(rows), encoding="utf-8")
+        return 0
+    lines = growth(rows, read_budgets())
+    for line in lines:
+        print(f"error: {line}", file=sys.stderr)
+    return 1 if lines else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,119 @@
+// One line of text per sample, and the comment that names its columns.
+//
+// auvest reads it back in python/auvest/telemetry.py.
+#pragma once
+
+#include <Arduino.h>
+#include <auvest.h>
+
+#include "config.h"
+#include "text_line.h"
+#include "wake_timer.h"
+
+/// What a sample was besides the state of the filter. Counters run from the start.
+struct Sample {
+  uint32_t number = 0;
+  wake_timer::Elapsed time;          ///< of the sample, since the start
+  float dt = 0;                      ///< predicted over [s]
+  bool measured = false;             ///< there is a z
+  bool corrected = false;            ///< and the filter has taken it
+  auvest::Vector<float, 2> z;        ///< range [m] and bearing [rad]
+  auvest::Vector<float, 2> desired;  ///< position [m]
+  float nis = 0;
+  auvest::Status status = auvest::Status::kOk;  ///< the first that is not kOk
+  uint32_t missed = 0;                          ///< samples without a measurement
+  uint32_t refused = 0;                         ///< lines received that were of no use
+  uint32_t late = 0;                            ///< samples taken after their deadline
+  uint32_t awake = 0;                           ///< ticks since the line before
+};
+
+class Telemetry {
+  static_assert(kCovarianceRows >= 1 && kCovarianceRows <= 6, "P has 1 to 6 rows to send");
+  static constexpr size_t kNumbers = 13 + kCovarianceRows * (kCovarianceRows + 1) / 2;
+  static constexpr size_t kCapacity = 80 + kNumbers * (kExactText ? 9 : 14);
+
+ public:
+  using Line = LineOut<kCapacity>;
+
+  /// Names the columns; to be sent once, before the first line.
+  static void introduce() {
+    Serial.print(
+        F("# auvest tracking_loop: 8 hexadecimal digits are the bits of a float\r\n"
+          "# columns: sample,time_s,dt_s,range_m,bearing_rad,desired_x_m,desired_y_m,"
+          "x_m,y_m,vx_m_s,vy_m_s,ax_m_s2,ay_m_s2"));
+    for (int i = 0; i < kCovarianceRows; ++i) {
+      for (int j = 0; j <= i; ++j) {
+        Serial.print(F(",P"));
+        Serial.print(i);
+        Serial.print(j);
+        Serial.print(F("_m2"));
+        const int per_seconds = i / 2 + j / 2;
+        if (per_seconds > 0) Serial.print(F("_s"));
+        if (per_seconds > 1) Serial.print(per_seconds);
+      }
+    }
+    Serial.print(F(",nis,interval_s,status,missed,refused,late,awake_us\r\n"));
+    Serial.flush();
+  }
+
+  static void remark_ram(size_t unused) {
+    Serial.print(F("# bytes of RAM never used: "));
+    Serial.print(unused);
+    Serial.print(F("\r\n"));
+  }
+
+  template <class Filter>
+  void write(const Sample& sample, const Filter& filter) {
+    line_.start("AUV");
+    line_.field(sample.number);
+    line_.field(sample.time.seconds);
+    decimals(sample.time.ticks);
+    number(sample.dt);
+    for (int i = 0; i < 2; ++i) optional(sample.measured, sample.z(i));
+    for (int i = 0; i < 2; ++i) number(sample.desired(i));
+    for (int i = 0; i < 6; ++i) number(filter.x()(i));
+    for (int i = 0; i < kCovarianceRows; ++i) {
+      for (int j = 0; j <= i; ++j) number(filter.belief().P(i, j));
+    }
+    optional(sample.corrected, sample.nis);
+    number(filter.interval());
+    line_.field(static_cast<uint32_t>(sample.status));
+    line_.field(sample.missed);
+    line_.field(sample.refused);
+    line_.field(sample.late);
+    line_.field(sample.awake * kMicrosecondsPerTick);
+    line_.finish();
+  }
+
+  Line& line() { return line_; }
+
+ private:
+  static constexpr uint32_t kMicrosecondsPerTick = 1000000 / wake_timer::kTicksPerSecond;
+
+  void number(float value) {
+    if (kExactText) {
+      line_.field(value);
+    } else {
+      line_.empty_field();
+      line_.print(value, 6);
+    }
+  }
+
+  void optional(bool present, float value) {
+    if (present) {
+      number(value);
+    } else {
+      line_.empty_field();
+    }
+  }
+
+  /// Ticks as the decimals of a second.
+  void decimals(uint32_t ticks) {
+    const uint32_t microseconds = ticks * kMicrosecondsPerTick;
+    line_.write('.');
+    for (uint32_t unit = 100000; unit > microseconds && unit > 1; unit /= 10) line_.write('0');
+    line_.print(microseconds);
+  }
+
+  Line line_;
+};

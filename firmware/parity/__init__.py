@@ -1,0 +1,1 @@
+"""Replay programs: the same record on every target."""

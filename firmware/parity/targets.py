@@ -1,0 +1,172 @@
+"""The targets on which a record is replayed: how the program is built and how it is run.
+
+Each target compiles one of the ``main`` functions beside this file around ``replay.hpp``.
+"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+ROOT = Path(__file__).resolve().parents[2]
+HERE = ROOT / "firmware/parity"
+INCLUDES = (f"-I{ROOT / 'cpp/include'}", "-I/usr/include/eigen3")
+
+_WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wdouble-promotion", "-Werror")
+_EIGEN = ("-DEIGEN_NO_IO", "-DEIGEN_NO_MALLOC", "-DEIGEN_DONT_VECTORIZE")
+
+#: The Debian package of each command.
+PACKAGES = {
+    "g++": "g++",
+    "clang++": "clang",
+    "avr-g++": "gcc-avr avr-libc",
+    "arm-none-eabi-g++": "gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib",
+    "qemu-system-arm": "qemu-system-arm",
+}
+
+#: Simulated seconds that a replay on the ATmega2560 may take.
+_LIMIT_S = 600
+#: Seconds that any replay may take.
+_TIMEOUT_S = 300
+
+
+class ReplayError(RuntimeError):
+    """A program could not be built, or did not end well."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """A compiler with its flags, and what runs the program.
+
+    Attributes
+    ----------
+    name : str
+    compiler : str
+        Command of the compiler.
+    flags : tuple of str
+        Its flags, but for the include paths.
+    machine : {"host", "avr", "mps2-an385", "mps2-an386"}
+        The computer itself, the simulated ATmega2560 board or a board of QEMU.
+    """
+
+    name: str
+    compiler: str
+    flags: tuple[str, ...]
+    machine: Literal["host", "avr", "mps2-an385", "mps2-an386"]
+
+    @property
+    def sources(self) -> tuple[Path, ...]:
+        """What is compiled."""
+        if self.machine == "avr":
+            return (HERE / "avr.cpp",)
+        if self.machine == "host":
+            return (HERE / "host.cpp",)
+        return (HERE / "host.cpp", HERE / "cortex_m.cpp")
+
+    def build(self, program: Path, *extra: str | Path) -> Path:
+        """Compile the replay program; ``extra`` are further flags and sources.
+
+        Raises
+        ------
+        ReplayError
+            If the compiler is missing or fails.
+        """
+        require(self.compiler)
+        own = [f"-I{ROOT / 'cpp/bindings'}"]
+        if self.machine == "avr":
+            own += [f"-I{ROOT / 'firmware/board'}", f"-I{ROOT / 'firmware/avr_std'}"]
+        # Before the library's own path: what is in `extra` is found first.
+        command = [self.compiler, *self.flags, *map(str, extra), *own, *INCLUDES]
+        command += [*map(str, self.sources), "-o", str(program)]
+        _run(command, f"compiling for {self.name}")
+        return program
+
+    def replay(self, program: Path, record: Path, trace: Path, board: Path | None) -> bytes:
+        """Run the program on a record and give its trace.
+
+        Parameters
+        ----------
+        program : Path
+            From :meth:`build`.
+        record, trace : Path
+            Files: the record, and where the trace goes.
+        board : Path
+            The runner ``auvest-board``; only the ATmega2560 uses it.
+
+        Raises
+        ------
+        ReplayError
+            If the program fails, crashes or does not end.
+        """
+        files = [str(record), str(trace)]
+        if self.machine == "host":
+            command = [str(program), *files]
+        elif self.machine == "avr":
+            command = [str(board), "--input", files[0], "--output", files[1]]
+            command += ["--limit", str(_LIMIT_S), str(program)]
+        else:
+            require("qemu-system-arm")
+            arguments = ",".join(f"arg={part}" for part in ("replay", *files))
+            command = ["qemu-system-arm", "-machine", self.machine, "-nographic"]
+            command += ["-monitor", "none", "-serial", "none", "-kernel", str(program)]
+            command += ["-semihosting-config", f"enable=on,target=native,{arguments}"]
+        _run(command, f"replaying on {self.name}")
+        return trace.read_bytes()
+
+
+def require(command: str) -> None:
+    """Raise ReplayError, with the package to install, if a command is missing."""
+    if shutil.which(command) is None:
+        raise ReplayError(f"{command} is missing: apt-get install {PACKAGES[command]}")
+
+
+def _run(command: list[str], what: str) -> None:
+    try:
+        done = subprocess.run(
+            command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=_TIMEOUT_S
+        )
+    except subprocess.TimeoutExpired:
+        raise ReplayError(f"{what} took more than {_TIMEOUT_S} s: {' '.join(command)}") from None
+    if done.returncode != 0:
+        raise ReplayError(
+            f"{what} failed with exit code {done.returncode}\n{' '.join(command)}\n"
+            f"{done.stdout}{done.stderr}"
+        )
+
+
+def _host(compiler: str, *flags: str) -> Target:
+    name = "-".join([{"g++": "gcc", "clang++": "clang"}[compiler], *(f.lstrip("-") for f in flags)])
+    common = ("-std=c++11", "-ffp-contract=off", *_WARNINGS)
+    return Target(name, compiler, (*flags, *common), "host")
+
+
+def _avr(name: str, *flags: str) -> Target:
+    chip = ("-mmcu=atmega2560", "-DF_CPU=16000000UL")
+    common = (*chip, "-std=gnu++11", "-fno-exceptions", *flags, *_WARNINGS)
+    return Target(name, "avr-g++", common, "avr")
+
+
+def _cortex(name: str, machine: Literal["mps2-an385", "mps2-an386"], *flags: str) -> Target:
+    common = ("-O2", "-std=c++11", "-ffp-contract=off", "-mthumb", *flags, *_EIGEN, *_WARNINGS)
+    common += ("-fno-exceptions", "-fno-rtti", "--specs=rdimon.specs", f"-T{HERE / 'mps2.ld'}")
+    return Target(name, "arm-none-eabi-g++", common, machine)
+
+
+TARGETS = (
+    _host("g++", "-O0"),
+    _host("g++", "-O3", "-march=native"),
+    _host("clang++", "-O0"),
+    _host("clang++", "-O3", "-march=native"),
+    # As the Arduino IDE compiles a sketch, and for speed.
+    _avr(
+        "atmega2560-ide",
+        *("-Os", "-flto", "-fuse-linker-plugin", "-fpermissive", "-fno-threadsafe-statics"),
+        *("-ffunction-sections", "-fdata-sections", "-Wl,--gc-sections"),
+    ),
+    _avr("atmega2560-O2", "-O2"),
+    _cortex("cortex-m4f", "mps2-an386", "-mcpu=cortex-m4", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"),
+    _cortex("cortex-m3", "mps2-an385", "-mcpu=cortex-m3"),
+)

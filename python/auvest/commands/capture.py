@@ -1,0 +1,531 @@
+"""``auvest capture``: record what the sketch ``tracking_loop`` reports, on a board or simulated."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import numpy.typing as npt
+import typer
+from rich.table import Table
+
+from auvest import MahalanobisInterval, RangeBearing, metrics, telemetry
+from auvest.board import Board, BoardError, Finished, PinChange, SerialLine
+from auvest.commands import console
+from auvest.commands.console import EXIT_CODES, ExitCode, Terminal, refuse_given
+from auvest.commands.version import version
+from auvest.scenarios import paper_aukf
+from auvest.scenarios.paper_aukf import NoiseKind, observed_positions
+from auvest.scenarios.tracking import Noise, Track
+from auvest.telemetry import LineError, Reader, Row
+
+Floats = npt.NDArray[np.float64]
+
+#: The pin that the sketch triggers its sonar with: D8 of an Arduino MEGA2560.
+TRIGGER_PIN = "PORTH5"
+#: Without a sample for this long, s, and for three intervals, the board is taken for lost.
+SILENCE_S = 10.0
+SOUND_M_S = 1500.0
+
+HELP = f"""Record what the sketch tracking_loop reports: a CSV file, a figure, a table.
+
+The sketch runs on an Arduino at --port, or on a simulated one with --simulator, where the vehicle \
+and its sonar are simulated too. --play-sonar simulates them for a board that has no sonar. \
+Every sample is in the CSV file as soon as it has come, with all the bits of its floats; Ctrl-C \
+ends a recording and keeps it.
+
+Examples:
+
+  auvest capture --simulator tracking_loop.ino.elf
+
+  auvest capture --simulator tracking_loop.ino.elf --noise lognormal --dropout 0.2
+
+  auvest capture --port /dev/ttyACM0 --output dive-7
+
+  auvest capture --port /dev/ttyACM0 --play-sonar --steps 60
+
+{EXIT_CODES}
+"""
+
+_WORLD = "Simulated vehicle and sonar"
+_NOISE = paper_aukf.paper_noise()
+
+
+class SimulatedSonar:
+    """A vehicle on the paper's track, and the sonar that measures it.
+
+    Parameters
+    ----------
+    noise : Noise
+        Of the two measurements; its dropouts are answers that never come.
+    seed : int
+        Of the noise.
+    station : (float, float)
+        Where the sonar is, m.
+    processing_s : float
+        What the sonar takes besides the way of the sound, s.
+
+    Attributes
+    ----------
+    truth : dict of int to (float, float)
+        True position at each sample asked for, m.
+    """
+
+    def __init__(
+        self,
+        noise: Noise = _NOISE,
+        *,
+        seed: int = 1,
+        station: tuple[float, float] = RangeBearing().station,
+        processing_s: float = 2e-3,
+    ) -> None:
+        self.truth: dict[int, tuple[float, float]] = {}
+        self._noise = noise
+        self._random = np.random.default_rng(seed)
+        self._station = station
+        self._processing_s = processing_s
+        self._track = Track(kind="straight")
+        self._start_s: float | None = None
+
+    def measure(self, sample: int, now_s: float) -> tuple[str, float] | None:
+        """Answer a request: the line, and how long after the trigger it comes (s), or nothing.
+
+        The sketch takes its first sample one initial interval after the start of the track.
+        """
+        if self._start_s is None:
+            self._start_s = now_s - MahalanobisInterval().initial_s
+        x, y = self.truth[sample] = self._track.position_at(now_s - self._start_s)
+        range_error, bearing_error, lost = self._draw()
+        dx, dy = x - self._station[0], y - self._station[1]
+        distance = math.hypot(dx, dy)
+        bearing = math.remainder(math.atan2(dy, dx) + bearing_error, math.tau)
+        if lost:
+            return None
+        delay = self._processing_s + 2 * distance / SOUND_M_S
+        return telemetry.answer(sample, distance + range_error, bearing), delay
+
+    def _draw(self) -> tuple[float, float, bool]:
+        noise, random = self._noise, self._random
+        unit = random.uniform(size=2) if noise.kind == "uniform" else random.normal(size=2)
+        if noise.kind == "lognormal":
+            unit = np.exp(unit)
+        errors = unit * (noise.range_m, noise.bearing_rad)
+        if noise.centred:
+            errors -= replace(noise, centred=False).mean
+        return float(errors[0]), float(errors[1]), bool(random.uniform() < noise.dropout)
+
+
+@dataclass
+class Recording:
+    """What has been heard so far; every sample is on the disk as soon as it has come.
+
+    Attributes
+    ----------
+    path : Path
+        The CSV file.
+    sonar : SimulatedSonar or None
+        Who answers the sketch; None: somebody else.
+    rows : list of dict
+        Samples.
+    triggered_s : dict of int to float
+        When each sample was asked for, in the time of who calls `hear`.
+    damaged : int
+        Lines that could not be read.
+    last_damage : str
+        What was wrong with the last of them.
+    awake_share : float
+        NaN as long as nobody but the board has measured it.
+    """
+
+    path: Path
+    sonar: SimulatedSonar | None
+    rows: list[Row] = field(default_factory=list)
+    triggered_s: dict[int, float] = field(default_factory=dict)
+    damaged: int = 0
+    last_damage: str = ""
+    awake_share: float = math.nan
+
+    def __post_init__(self) -> None:
+        self._reader = Reader()
+        self._file = self.path.open("w", encoding="utf-8", newline="")
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def hear(self, line: str, triggered_s: float) -> tuple[str, float] | None:
+        """Take a line, and give the sonar's answer to it with its delay (s), if there is one."""
+        sample = telemetry.requested_sample(line)
+        if sample is not None:
+            self.triggered_s[sample] = triggered_s
+            return None if self.sonar is None else self.sonar.measure(sample, triggered_s)
+        try:
+            row = self._reader.read(line)
+        except LineError as error:
+            self.damaged += 1
+            self.last_damage = str(error)
+            return None
+        if row is not None:
+            self._add(row)
+        return None
+
+    def _add(self, row: Row) -> None:
+        if self.sonar is not None:
+            unknown = (math.nan, math.nan)
+            row["true_x_m"], row["true_y_m"] = self.sonar.truth.get(int(row["sample"]), unknown)
+        if not self.rows:
+            self._file.write(",".join(row) + "\n")
+        # Nine digits are all the bits of a float, twelve are a time to 1 us.
+        cells = ("" if value != value else f"{value:.12g}" for value in row.values())
+        self._file.write(",".join(cells) + "\n")
+        self._file.flush()
+        self.rows.append(row)
+
+    def column(self, name: str) -> Floats:
+        """Collect one column, NaN where it is missing."""
+        return np.array([row.get(name, math.nan) for row in self.rows])
+
+    def columns(self, *names: str) -> Floats:
+        """Collect columns side by side."""
+        return np.stack([self.column(name) for name in names], axis=-1)
+
+    @property
+    def announced_s(self) -> float:
+        """The longer of the last two intervals that the sketch has announced, s."""
+        return max((row["interval_s"] for row in self.rows[-2:]), default=0.0)
+
+    @property
+    def timing_error_s(self) -> float:
+        """How far the triggers lie from the moments in the lines, at most, s."""
+        pairs = [
+            (row["time_s"], self.triggered_s[int(row["sample"])])
+            for row in self.rows
+            if int(row["sample"]) in self.triggered_s
+        ]
+        if not pairs:
+            return math.nan
+        said, seen = np.array(pairs).T
+        return float(np.abs((seen - seen[0]) - (said - said[0])).max())
+
+
+def command(
+    ctx: typer.Context,
+    port: Annotated[
+        str | None, typer.Option(help="Serial port of the board, like /dev/ttyACM0 or COM3.")
+    ] = None,
+    baud: Annotated[int, typer.Option(min=300, help="Baud rate of --port.")] = 115200,
+    simulator: Annotated[
+        Path | None,
+        typer.Option(
+            exists=True,
+            dir_okay=False,
+            help="The compiled sketch (.elf), run on a simulated board.",
+        ),
+    ] = None,
+    steps: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            max=100_000,
+            help="Samples to record.",
+            show_default=f"{paper_aukf.STEPS} simulated, until Ctrl-C from a port",
+        ),
+    ] = None,
+    station: Annotated[
+        tuple[float, float],
+        typer.Option(metavar="X Y", help="Where the station is, m, as in the sketch."),
+    ] = RangeBearing().station,
+    play_sonar: Annotated[
+        bool,
+        typer.Option(
+            "--play-sonar", help="Answer the board at --port as sonar.", rich_help_panel=_WORLD
+        ),
+    ] = False,
+    noise: Annotated[
+        NoiseKind,
+        typer.Option(
+            help="Kind of both noises: U(0,1), N(0,1) or exp(N(0,1)).", rich_help_panel=_WORLD
+        ),
+    ] = "normal",
+    range_noise: Annotated[
+        float,
+        typer.Option(
+            callback=console.positive, help="Scale of the range noise, m.", rich_help_panel=_WORLD
+        ),
+    ] = _NOISE.range_m,
+    bearing_noise: Annotated[
+        float,
+        typer.Option(
+            callback=console.positive,
+            help="Scale of the bearing noise, rad.",
+            rich_help_panel=_WORLD,
+        ),
+    ] = _NOISE.bearing_rad,
+    dropout: Annotated[
+        float,
+        typer.Option(
+            callback=console.fraction,
+            help="Probability that an answer never comes.",
+            rich_help_panel=_WORLD,
+        ),
+    ] = 0.0,
+    seed: console.Seed = 1,
+    output: Annotated[
+        Path,
+        typer.Option(
+            file_okay=False,
+            help="Folder for CSV, figure and JSON; made if missing.",
+            rich_help_panel="Output",
+        ),
+    ] = Path("auvest-output/capture"),
+    no_figure: Annotated[
+        bool, typer.Option("--no-figure", help="Draw nothing.", rich_help_panel="Output")
+    ] = False,
+    as_json: console.Json = False,
+    quiet: console.Quiet = False,
+) -> None:
+    """Record; the help text is :data:`HELP`."""
+    terminal = Terminal(as_json=as_json, quiet=quiet)
+    if (port is None) == (simulator is None):
+        raise typer.BadParameter("give one of the two.", param_hint="'--port' / '--simulator'")
+    played = simulator is not None or play_sonar
+    if simulator is not None:
+        steps = steps or paper_aukf.STEPS
+        refuse_given(ctx, ("baud", "play_sonar"), "belongs to --port.")
+    if not played:
+        world = ("noise", "range_noise", "bearing_noise", "dropout", "seed")
+        refuse_given(ctx, world, "belongs to --simulator or --play-sonar.")
+
+    sensor = RangeBearing(station=station)
+    errors = paper_aukf.paper_noise(
+        noise, range_m=range_noise, bearing_rad=bearing_noise, dropout=dropout
+    )
+    sonar = SimulatedSonar(errors, seed=seed, station=sensor.station) if played else None
+    terminal.make_folder(output)
+    path = output / "record.csv"
+    if port is not None and path.exists():
+        terminal.fail(
+            f"{path} exists and will not be overwritten: choose another --output", ExitCode.USAGE
+        )
+
+    interrupted = False
+    trouble = ""
+    with terminal.writing(output):
+        recording = Recording(path, sonar)
+        with terminal.progress("samples") as progress:
+
+            def wanted() -> bool:
+                done = len(recording.rows)
+                progress(done, steps or done)
+                return steps is None or done < steps
+
+            try:
+                if simulator is not None:
+                    limit_s = 10 + 2 * (steps or 0)  # the longest interval is 1 s
+                    run_simulated(simulator, recording, wanted, limit_s)
+                elif port is not None:
+                    _listen(port, baud, recording, wanted)
+            except KeyboardInterrupt:
+                interrupted = steps is not None
+            except (BoardError, _ConnectionLost, FileNotFoundError, ValueError) as error:
+                trouble = str(error)  # ValueError: what was given as sketch is none
+            finally:
+                recording.close()
+    if not recording.rows:
+        path.unlink(missing_ok=True)
+        why = trouble or recording.last_damage or "interrupted"
+        code = ExitCode.INTERRUPTED if interrupted else ExitCode.FAILED
+        terminal.fail(f"no sample has come: {why}", code)
+
+    values = measures(recording, simulated=simulator is not None)
+    settings: dict[str, Any] = {
+        "source": str(simulator or port),
+        "steps": steps,
+        "station": list(sensor.station),
+    }
+    if played:
+        settings.update(noise=asdict(errors), seed=seed)
+    files = {"record": path}
+    with terminal.writing(output):
+        if not no_figure:
+            files["figure"] = _draw(output / "figure.png", recording, sensor, settings["source"])
+        files["results"] = output / "results.json"
+        document = {
+            "command": "capture",
+            "version": version(),
+            "settings": settings,
+            "complete": not (interrupted or trouble),
+            "results": values,
+            "files": {name: str(file) for name, file in files.items()},
+        }
+        files["results"].write_text(console.to_json(document) + "\n", encoding="utf-8")
+
+    terminal.result_json(document)
+    terminal.result(_table(values, settings["source"]))
+    for name, file in files.items():
+        terminal.result(f"{name:9} {file}")
+    if trouble:
+        terminal.fail(f"{trouble}; the samples until then are kept", ExitCode.FAILED)
+    if interrupted:
+        terminal.fail(
+            f"interrupted: {values['samples']} of {steps} samples are kept", ExitCode.INTERRUPTED
+        )
+
+
+def run_simulated(
+    elf: Path, recording: Recording, wanted: Callable[[], bool], limit_s: float
+) -> None:
+    """Run the sketch on a simulated board as long as samples are wanted.
+
+    Parameters
+    ----------
+    elf : Path
+        The compiled sketch.
+    recording : Recording
+        Takes the lines; its sonar answers.
+    wanted : callable
+        Asked after each event.
+    limit_s : float
+        Simulated time after which the run has failed, s.
+
+    Raises
+    ------
+    BoardError
+        If the sketch does what no chip should do.
+    FileNotFoundError
+        If the simulator is not there.
+    """
+    triggered_s = 0.0
+    with Board(elf, watch=[TRIGGER_PIN], limit_s=limit_s) as board:
+        for event in board:
+            if isinstance(event, PinChange) and event.level:
+                triggered_s = event.time_s
+            if isinstance(event, SerialLine):
+                answer = recording.hear(event.text, triggered_s)
+                if answer is not None:
+                    text, delay_s = answer
+                    board.send(text, max(0.0, triggered_s + delay_s - event.time_s))
+            if isinstance(event, Finished) or not wanted():
+                break
+    recording.awake_share = board.report.awake_share
+
+
+class _ConnectionLost(RuntimeError):
+    """The port does not open, is gone, or is silent."""
+
+
+def _listen(port: str, baud: int, recording: Recording, wanted: Callable[[], bool]) -> None:
+    """Record from a serial port as long as samples are wanted and the board is heard."""
+    try:
+        import serial
+    except ImportError:
+        raise _ConnectionLost("--port needs pyserial: pip install 'auvest[serial]'") from None
+    try:
+        with serial.Serial(port, baud, timeout=0.1) as link:
+            last_s = time.monotonic()
+            received = b""
+            while wanted():
+                received += link.readline()
+                now = time.monotonic()
+                if received.endswith(b"\n"):
+                    known = len(recording.rows)
+                    answer = recording.hear(received.decode("latin-1").rstrip("\r\n"), now)
+                    received = b""
+                    if answer is not None:
+                        text, delay_s = answer
+                        time.sleep(delay_s)
+                        link.write(f"{text}\r\n".encode("latin-1"))
+                    if len(recording.rows) > known:
+                        last_s = now
+                patience_s = max(SILENCE_S, 3 * recording.announced_s)
+                if now - last_s > patience_s:
+                    raise _ConnectionLost(
+                        f"{port}: no sample for {patience_s:g} s: does the board run "
+                        f"tracking_loop, at {baud} baud? {recording.last_damage}".rstrip()
+                    )
+    except (serial.SerialException, OSError) as error:
+        raise _ConnectionLost(f"{port}: {error}") from None
+
+
+def measures(recording: Recording, *, simulated: bool) -> dict[str, Any]:
+    """Compute the numbers of the table."""
+    time_s = recording.column("time_s")
+    last = recording.rows[-1]
+    nis = recording.column("nis")
+    known = nis[np.isfinite(nis)]
+    span = float(time_s[-1] - time_s[0])
+    awake = float(recording.column("awake_us")[1:].sum()) * 1e-6
+    error = recording.columns("x_m", "y_m") - recording.columns("true_x_m", "true_y_m")
+    return {
+        "samples": len(time_s),
+        "missed": int(last["missed"]),
+        "refused_answers": int(last["refused"]),
+        "late": int(last["late"]),
+        "not_ok": int((recording.column("status") != 0).sum()),
+        "damaged_lines": recording.damaged,
+        "duration_s": span,
+        "mean_interval_s": float(recording.column("dt_s").mean()),
+        "nis_mean": float(known.mean()) if known.size else math.nan,
+        "awake_share_simulated": recording.awake_share,
+        "awake_share_by_board": awake / span if span > 0 else math.nan,
+        "worst_timing_error_s": recording.timing_error_s if simulated else math.nan,
+        "rmse_m": metrics.rmse(error) if np.isfinite(error).any() else math.nan,
+    }
+
+
+def _draw(path: Path, recording: Recording, sensor: RangeBearing, source: str) -> Path:
+    from auvest import plots  # here, because matplotlib takes long to import
+
+    return plots.save(
+        plots.capture_figure(
+            recording.columns("x_m", "y_m"),
+            recording.columns("desired_x_m", "desired_y_m"),
+            observed_positions(recording.columns("range_m", "bearing_rad"), sensor.station),
+            recording.columns("true_x_m", "true_y_m"),
+            station=sensor.station,
+            time_s=recording.column("time_s"),
+            interval_s=recording.column("interval_s"),
+            sigma_m=np.sqrt(recording.column("P00_m2") + recording.column("P11_m2")),
+            nis=recording.column("nis"),
+            title=f"{Path(source).name}: {len(recording.rows)} samples",
+        ),
+        path,
+    )
+
+
+def _table(values: dict[str, Any], source: str) -> Table:
+    table = Table(
+        title=f"{source}: {values['samples']} samples in {values['duration_s']:.1f} s",
+        title_justify="left",
+        title_style="bold",
+    )
+    for title, justify in (("quantity", "left"), ("value", "right"), ("note", "left")):
+        table.add_column(title, justify=justify)  # type: ignore[arg-type]
+    rows = [
+        ("missed measurements", f"{values['missed']}", "predicted only"),
+        ("answers refused", f"{values['refused_answers']}", "corrupt, or to another sample"),
+        ("deadlines missed", f"{values['late']}", "by more than 1 ms"),
+        ("status not ok", f"{values['not_ok']}", "samples"),
+        ("lines damaged", f"{values['damaged_lines']}", "on their way from the board"),
+        ("mean interval / s", f"{values['mean_interval_s']:.4f}", ""),
+        ("NIS, mean", f"{values['nis_mean']:.3f}", "expected 2; below: cautious"),
+    ]
+    if math.isfinite(values["awake_share_simulated"]):
+        share = 100 * values["awake_share_simulated"]
+        rows.append(("time awake", f"{share:.2f} %", "counted by the simulator"))
+    else:
+        share = 100 * values["awake_share_by_board"]
+        rows.append(("time awake", f"{share:.2f} %", "counted by the board, without interrupts"))
+    if math.isfinite(values["worst_timing_error_s"]):
+        error = 1e3 * values["worst_timing_error_s"]
+        rows.append(("worst timing error / ms", f"{error:.3f}", "trigger against commanded moment"))
+    if math.isfinite(values["rmse_m"]):
+        rows.append(("position RMSE / m", f"{values['rmse_m']:.4f}", "against the simulated truth"))
+    for row in rows:
+        table.add_row(*row)
+    return table

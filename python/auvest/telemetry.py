@@ -1,0 +1,120 @@
+"""The text that the sketch ``tracking_loop`` and its sonar speak over a serial line.
+
+Every line is ``$body*hh``; ``hh`` is the exclusive or of the characters of the body, as in
+NMEA 0183. The sketch asks its sonar with ``PING,sample``, is answered with
+``SONAR,sample,range,bearing`` and reports each sample as ``AUV,...``; a comment names the columns.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import struct
+from functools import reduce
+from operator import xor
+
+#: One sample; NaN where the sketch had nothing to send.
+Row = dict[str, float]
+
+_COLUMNS = "# columns: "
+_BITS = re.compile(r"[0-9a-f]{8}")
+#: Columns that are always decimal: eight digits there are not the bits of a float.
+_DECIMAL = frozenset({"sample", "time_s", "status", "missed", "refused", "late", "awake_us"})
+
+
+class LineError(ValueError):
+    """A line that is not what was sent, or that this version does not understand."""
+
+
+def frame(body: str) -> str:
+    """Wrap a body in ``$`` and its checksum."""
+    return f"${body}*{_checksum(body):02x}"
+
+
+def body_of(line: str) -> str:
+    """Give the body of a line.
+
+    Raises
+    ------
+    LineError
+        If the line is not whole.
+    """
+    match = re.fullmatch(r"\$([^$*]*)\*([0-9A-Fa-f]{2})", line)
+    if match is None:
+        raise LineError(f"not a whole line: {line!r}")
+    body, given = match[1], int(match[2], 16)
+    if given != _checksum(body):
+        raise LineError(f"checksum {given:02x}, but {_checksum(body):02x} computed: {line!r}")
+    return body
+
+
+def requested_sample(line: str) -> int | None:
+    """Give the number of the sample that the sketch asks its sonar for; None for other lines."""
+    if not line.startswith("$PING,"):
+        return None
+    try:
+        return int(body_of(line).removeprefix("PING,"))
+    except ValueError:
+        return None
+
+
+def answer(sample: int, range_m: float, bearing_rad: float) -> str:
+    """Write the sonar's answer, to 1 um and 1 urad."""
+    return frame(f"SONAR,{sample},{range_m:.6f},{bearing_rad:.6f}")
+
+
+class Reader:
+    """Reads what the sketch sends, line by line.
+
+    Attributes
+    ----------
+    columns : tuple of str
+        Names with units; empty until the comment that names them has come.
+    """
+
+    def __init__(self) -> None:
+        self.columns: tuple[str, ...] = ()
+
+    def read(self, line: str) -> Row | None:
+        """Read a line without its end.
+
+        Returns
+        -------
+        dict or None
+            One sample; None for comments and for what is said to the sonar.
+
+        Raises
+        ------
+        LineError
+            If the line is damaged, or a sample comes before the names of its columns.
+        """
+        if line.startswith(_COLUMNS):
+            self.columns = tuple(line.removeprefix(_COLUMNS).split(","))
+            return None
+        if not line or line.startswith("#"):
+            return None
+        kind, *cells = body_of(line).split(",")
+        if kind != "AUV":
+            return None
+        if not self.columns:
+            raise LineError("the names of the columns have not come: reset the board")
+        if len(cells) != len(self.columns):
+            raise LineError(f"{len(cells)} values for {len(self.columns)} columns: {line!r}")
+        try:
+            pairs = zip(self.columns, cells, strict=True)
+            return {name: _number(name, cell) for name, cell in pairs}
+        except ValueError:
+            raise LineError(f"not a number in {line!r}") from None
+
+
+def _checksum(body: str) -> int:
+    return reduce(xor, body.encode("latin-1"), 0)
+
+
+def _number(name: str, cell: str) -> float:
+    if cell == "":
+        return math.nan
+    if name not in _DECIMAL and _BITS.fullmatch(cell):
+        value: float = struct.unpack(">f", bytes.fromhex(cell))[0]
+        return value
+    return math.nan if cell == "ovf" else float(cell)

@@ -1,0 +1,78 @@
+"""What auvest takes on the chip: measured again, compared with what is committed and promised."""
+
+from dataclasses import replace
+
+import pytest
+
+from firmware import budgets
+
+pytest_plugins = ["board_support"]
+
+
+@pytest.fixture(scope="module")
+def measured(runner, tmp_path_factory):
+    """All programs, compiled and run now."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("AUVEST_BOARD", str(runner))
+        return budgets.measure(tmp_path_factory.mktemp("budgets"))
+
+
+@pytest.fixture(scope="module")
+def rows(measured):
+    return {row.program: row for row in measured}
+
+
+def test_nothing_has_grown(measured):
+    assert budgets.growth(measured, budgets.read_budgets()) == []
+
+
+def test_page_is_the_committed_tables():
+    assert budgets.PAGE.read_text() == budgets.page(budgets.read_budgets())
+
+
+def test_every_filter_and_example_is_measured(rows, root):
+    examples = {path.name for path in (root / "firmware/library/examples").iterdir()}
+    assert rows.keys() >= examples | {"empty", "ekf", "ukf", "aukf", "aukf_covariance_budget"}
+
+
+def test_aukf_keeps_its_promises(rows):
+    """The figures of the design: 16 MHz, 8 KB of RAM; its object is held by a static_assert."""
+    aukf = rows["aukf"]
+    assert aukf.cycles_median <= 95_000
+    assert aukf.cycles_max <= 1.3 * aukf.cycles_median
+    assert aukf.stack_bytes <= 450
+    assert aukf.flash_bytes - rows["empty"].flash_bytes <= 12 * 1024
+
+
+ROW = budgets.Row("atmega2560", "aukf", 10_000, 300, 400, 1_000, 2_000, 3_000)
+
+
+def test_growth_up_to_the_tolerance_is_accepted():
+    assert budgets.growth([replace(ROW, flash_bytes=10_200, cycles_max=3_060)], [ROW]) == []
+    assert budgets.growth([replace(ROW, flash_bytes=9_000)], [ROW]) == []
+
+
+@pytest.mark.parametrize(
+    "name", ["flash_bytes", "static_ram_bytes", "stack_bytes", "cycles_median", "cycles_max"]
+)
+def test_growth_beyond_it_is_named(name):
+    now = replace(ROW, **{name: int(getattr(ROW, name) * 1.021) + 1})
+    (line,) = budgets.growth([now], [ROW])
+    assert f"atmega2560 aukf {name}: " in line
+    assert "at most 2%" in line
+
+
+def test_programs_that_come_and_go_are_named():
+    assert budgets.growth([ROW], []) == ["atmega2560 aukf: not in budgets.csv"]
+    assert budgets.growth([], [ROW]) == ["atmega2560 aukf: no longer measured"]
+    assert budgets.growth([replace(ROW, cycles_max=None)], [ROW]) == [
+        "atmega2560 aukf cycles_max: None instead of 3000"
+    ]
+
+
+def test_table_comes_back(tmp_path):
+    path = tmp_path / "budgets.csv"
+    rows = [replace(ROW, program="empty", cycles_min=None), ROW]
+    budgets.write_budgets(rows, path)
+    assert budgets.read_budgets(path) == rows
+    assert path.read_text().splitlines()[0] == ",".join(budgets.COLUMNS)

@@ -1,0 +1,321 @@
+"""The Arduino library: what Arduino's specification and its linter's strict mode ask of it.
+
+https://arduino.github.io/arduino-cli/latest/library-specification
+https://arduino.github.io/arduino-lint/latest/rules/library
+"""
+
+import json
+import re
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from firmware import package
+
+CATEGORIES = {
+    "Communication", "Data Processing", "Data Storage", "Device Control", "Display", "Other",
+    "Sensors", "Signal Input/Output", "Timing",
+}  # fmt: skip
+KEYWORD_KINDS = {"KEYWORD1", "KEYWORD2", "KEYWORD3", "LITERAL1", "LITERAL2"}
+MAX_NAME = 63  # characters of a file or folder
+SEMVER = r"(0|[1-9]\d*)\.(0|[1-9]\d*)\.(0|[1-9]\d*)(-[0-9A-Za-z.-]+)?(\+[0-9A-Za-z.-]+)?"
+
+
+@pytest.fixture(scope="module")
+def folder(library) -> Path:
+    """Return the unpacked library."""
+    return library.parent / "auvest"
+
+
+@pytest.fixture(scope="module")
+def properties(folder) -> dict[str, str]:
+    """Return the fields of library.properties."""
+    lines = (folder / "library.properties").read_text().splitlines()
+    fields = [line.split("=", 1) for line in lines]
+    assert all(len(field) == 2 for field in fields), "each line is name=value"
+    assert len({name for name, _ in fields}) == len(fields), "no field twice"
+    return dict(fields)
+
+
+@pytest.fixture(scope="module")
+def files(library) -> list[zipfile.ZipInfo]:
+    """Return the entries of the zip."""
+    with zipfile.ZipFile(library) as archive:
+        assert archive.testzip() is None
+        return archive.infolist()
+
+
+# ---- The zip -------------------------------------------------------------------------------------
+
+
+def test_same_sources_same_bytes(library, tmp_path):
+    again = package.package(tmp_path)
+    assert again.name == library.name == f"auvest-{package.version()}.zip"
+    assert again.read_bytes() == library.read_bytes()
+
+
+def test_entries_are_plain_sorted_files_in_one_folder(files):
+    names = [entry.filename for entry in files]
+    assert names == sorted(names)
+    assert {name.split("/")[0] for name in names} == {"auvest"}
+    for entry in files:
+        assert entry.date_time == (1980, 1, 1, 0, 0, 0)
+        assert entry.external_attr >> 16 == 0o100644, "a regular file, no link, not executable"
+
+
+def test_the_unpacked_folder_is_the_zip(library, folder):
+    with zipfile.ZipFile(library) as archive:
+        zipped = {name: archive.read(name) for name in archive.namelist()}
+    unpacked = {
+        path.relative_to(folder.parent).as_posix(): path.read_bytes()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
+    assert unpacked == zipped
+
+
+def test_packaging_again_leaves_nothing_old_behind(tmp_path):
+    stale = package.package(tmp_path).parent / "auvest" / "src" / "stale.hpp"
+    stale.touch()
+    package.package(tmp_path)
+    assert not stale.exists()
+
+
+def test_names_of_files(files):
+    names = [entry.filename for entry in files]
+    assert len({name.lower() for name in names}) == len(names), "some file systems ignore case"
+    for name in names:
+        for part in name.split("/"):
+            assert len(part) <= MAX_NAME
+            assert re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]*", part), name
+        assert Path(name).suffix not in {".exe", ".o", ".a", ".so", ".pyc", ".orig"}
+        assert Path(name).name != ".development"
+
+
+def test_size(library):
+    assert library.stat().st_size < 1_000_000
+
+
+# ---- library.properties and library.json ---------------------------------------------------------
+
+
+def test_required_fields(properties):
+    required = [
+        "name",
+        "version",
+        "author",
+        "maintainer",
+        "sentence",
+        "paragraph",
+        "category",
+        "url",
+        "architectures",
+    ]
+    for field in required:
+        assert properties.get(field, "").strip(), field
+    assert set(properties) <= {*required, "includes", "depends"}, "misspelt, or of no use here"
+    assert all(value == value.strip() for value in properties.values())
+
+
+def test_name(properties):
+    name = properties["name"]
+    assert name == "auvest"
+    assert re.fullmatch(r"[A-Za-z][A-Za-z0-9 _.-]*", name)
+    assert not re.search("arduino", name, re.IGNORECASE)
+    assert len(name) <= 16
+
+
+def test_version_is_the_projects(properties, root):
+    assert re.fullmatch(SEMVER, properties["version"])
+    assert f'\nversion = "{properties["version"]}"\n' in (root / "pyproject.toml").read_text()
+
+
+def test_people(properties):
+    for field in ("author", "maintainer"):
+        assert not re.search("arduino", properties[field], re.IGNORECASE)
+
+
+def test_texts(properties):
+    sentence, paragraph = properties["sentence"], properties["paragraph"]
+    assert sentence.endswith(".")
+    assert sentence[0].isupper()
+    assert sentence not in paragraph, "the paragraph is shown behind the sentence"
+    assert not re.search(r"\blibrary for arduino\b", sentence, re.IGNORECASE)
+
+
+def test_category(properties):
+    assert properties["category"] in CATEGORIES - {"Other"}
+
+
+def test_url(properties):
+    assert re.fullmatch(r"https://[a-z0-9.-]+\.[a-z]+/\S*", properties["url"])
+
+
+def test_architectures(properties):
+    assert properties["architectures"] == "*"
+
+
+def test_includes_is_the_header_named_like_the_library(properties, folder):
+    assert properties["includes"] == f"{properties['name']}.h"
+    assert (folder / "src" / properties["includes"]).is_file()
+
+
+def test_library_json_agrees(properties, folder):
+    manifest = json.loads((folder / "library.json").read_text())
+    assert manifest["name"] == properties["name"]
+    assert manifest["version"] == properties["version"]
+    assert manifest["description"] == properties["sentence"]
+    assert manifest["headers"] == properties["includes"]
+    assert manifest["homepage"] == properties["url"]
+    assert [author["name"] for author in manifest["authors"]] == [properties["author"]]
+    assert manifest["platforms"] == manifest["frameworks"] == properties["architectures"]
+    assert manifest["license"].split(" AND ")[0] == "MIT"
+
+
+# ---- Structure -----------------------------------------------------------------------------------
+
+
+def test_top_of_the_library(folder):
+    assert {path.name for path in folder.iterdir()} == {
+        "LICENSE", "LICENSE-Eigen.txt", "README.md", "examples", "keywords.txt", "library.json",
+        "library.properties", "src",
+    }  # fmt: skip
+
+
+def test_licences(folder, root):
+    assert (folder / "LICENSE").read_bytes() == (root / "LICENSE").read_bytes()
+    text = (folder / "LICENSE-Eigen.txt").read_text()
+    assert "Mozilla Public License Version 2.0" in text
+    assert "Exhibit A - Source Code Form License Notice" in text
+    assert "Redistribution and use in source and binary forms" in text, "BSD: MKL_support.h"
+
+
+def test_source_folder_has_our_headers_and_those_for_avr(folder, root):
+    source = folder / "src"
+    ours = {p.relative_to(source / "auvest") for p in (source / "auvest").rglob("*.hpp")}
+    assert ours == {
+        p.relative_to(root / "cpp/include/auvest") for p in (root / "cpp/include").rglob("*.hpp")
+    }
+    standard = {path.name for path in (root / "firmware" / "avr_std").iterdir()}
+    assert standard <= {path.name for path in source.iterdir()}
+    assert not list(source.rglob("*.c*")), "header-only"
+
+
+def test_examples(folder):
+    sketches = list((folder / "examples").iterdir())
+    assert {sketch.name for sketch in sketches} >= {"first_steps"}
+    for sketch in sketches:
+        assert (sketch / f"{sketch.name}.ino").is_file()
+        assert [path.name for path in sketch.glob("*.ino")] == [f"{sketch.name}.ino"]
+    assert len(list(folder.rglob("*.ino"))) == len(sketches), "no sketch elsewhere"
+
+
+def test_every_example_compiles(folder, build_sketch):
+    for sketch in (folder / "examples").iterdir():
+        report = build_sketch(sketch, warnings="all").report
+        warned = re.findall(rf"{sketch.name}/\S+: warning: .*", report)
+        assert not warned
+
+
+# ---- keywords.txt --------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def keywords(folder) -> dict[str, str]:
+    """Return the keywords: name to kind."""
+    lines = (folder / "keywords.txt").read_text().splitlines()
+    entries = [line for line in lines if line and not line.startswith("#")]
+    for line in entries:
+        assert re.fullmatch(r"\w+\t\w+", line), f"{line!r}: name, one tab, kind"
+    pairs = [line.split("\t") for line in entries]
+    assert len({name for name, _ in pairs}) == len(pairs), "no name twice"
+    assert {kind for _, kind in pairs} <= KEYWORD_KINDS
+    return dict(pairs)
+
+
+def test_keywords_are_the_public_types(keywords, folder):
+    """Types in namespace auvest, of the headers that a user names types from."""
+    public = set()
+    for path in (folder / "src" / "auvest").rglob("*.hpp"):
+        if path.parent.name in {"scenarios", "math"} and path.name != "random.hpp":
+            continue
+        text = re.sub(r"namespace detail \{.*?\n\}  // namespace detail", "", path.read_text(),
+                      flags=re.DOTALL)  # fmt: skip
+        public |= set(re.findall(r"^(?:class|struct|enum class|using) (\w+)(?![\w<;])", text,
+                                 re.MULTILINE))  # fmt: skip
+    types = {name for name, kind in keywords.items() if kind == "KEYWORD1"}
+    internal = {"GaussianFilter", "SigmaPoints"}
+    assert types == public - internal
+
+
+def test_keywords_are_the_values_of_status(keywords, folder):
+    text = (folder / "src/auvest/status.hpp").read_text()
+    values = re.search(r"enum class Status.*?\{(.*?)\}", text, re.DOTALL)[1]
+    literals = {name for name, kind in keywords.items() if kind == "LITERAL1"}
+    assert literals == set(re.findall(r"^  (k\w+)", values, re.MULTILINE))
+
+
+def test_keywords_are_functions_that_exist(keywords, folder):
+    text = "".join(path.read_text() for path in (folder / "src/auvest").rglob("*.hpp"))
+    for name in (name for name, kind in keywords.items() if kind == "KEYWORD2"):
+        assert re.search(rf"\b{name}\(|\b{name};", text), name
+
+
+# ---- It compiles where there is nothing else -----------------------------------------------------
+
+
+ARDUINO = "-DARDUINO=10819"
+MEGA2560 = "-mmcu=atmega2560"
+
+
+@pytest.mark.parametrize(
+    ("compiler", "options"),
+    [
+        ("avr-g++", [MEGA2560, "-std=gnu++11", ARDUINO]),
+        ("avr-g++", [MEGA2560, "-std=gnu++11"]),
+        ("avr-g++", [MEGA2560, "-std=gnu++14"]),
+        ("arm-none-eabi-g++", ["-mcpu=cortex-m0plus", "-mthumb", "-std=gnu++11", ARDUINO]),
+        ("arm-none-eabi-g++", ["-mcpu=cortex-m7", "-mfloat-abi=hard", "-std=gnu++17"]),
+        ("g++", ["-std=c++11", ARDUINO]),
+        ("g++", ["-std=c++20", ARDUINO]),
+        ("clang++", ["-std=c++11", ARDUINO]),
+    ],
+)
+def test_the_source_folder_is_all_it_needs(compile_cpp, folder, compiler, options):
+    strict = ["-Wall", "-Wextra", "-Werror"]
+    compile_cpp(compiler, "#include <auvest.h>\n", "-c", *options, *strict, f"-I{folder / 'src'}")
+
+
+def test_eigen_is_what_is_included_and_no_more(compile_cpp, folder, tmp_path):
+    source = folder / "src"
+    found = set()
+    for compiler, options in (
+        ("avr-g++", [MEGA2560, "-std=gnu++11"]),
+        ("g++", [ARDUINO, "-std=gnu++17"]),
+    ):
+        compile_cpp(compiler, "#include <auvest.h>\n", "-M", *options, f"-I{source}")
+        found |= set((tmp_path / "object").read_text().replace("\\\n", " ").split())
+    brought = {str(path) for path in (source / "Eigen").rglob("*") if path.is_file()}
+    assert brought == {name for name in found if name.startswith(str(source / "Eigen"))}
+    vector_code = {path.name for path in (source / "Eigen/src/Core/arch").iterdir()} - {"Default"}
+    assert not vector_code
+
+
+# ---- What goes wrong -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("attribute", "message"),
+    [("_EIGEN", "install libeigen3-dev"), ("_EIGEN_LICENCE", "install libeigen3-dev")],
+)
+def test_missing_eigen_names_the_package(monkeypatch, tmp_path, attribute, message):
+    monkeypatch.setattr(package, attribute, tmp_path / "nowhere")
+    with pytest.raises(package.PackageError, match=message):
+        package.package(tmp_path)
+
+
+def test_missing_compiler_names_the_package(monkeypatch, tmp_path):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(package.PackageError, match=r"avr-g\+\+ is not installed: install gcc-avr"):
+        package.package(tmp_path)

@@ -1,0 +1,193 @@
+"""The same records give the same bits on every target; and what would break that is noticed.
+
+The reference is Python: what a user validates on the desk. NaN is compared by its bits as well: a
+filter never keeps one, and where a measurement is missing the trace has the one NaN of the library.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from auvest import SelfTestPart, Status
+from firmware.parity import golden
+from firmware.parity.targets import TARGETS
+from tests.parity.comparison import differing_bits, first_difference, ulps
+from tests.parity.records import REFERENCED, SELF_TEST, TRACE, all_records, bytes_of, trace_of
+
+CONTROLS = Path(__file__).parent / "controls"
+RECORDS = all_records()
+BY_NAME = {record.name: record for record in RECORDS}
+TARGET = {target.name: target for target in TARGETS}
+
+#: avr-libc's division rounds subnormal quotients down; this record lives of them.
+SUBNORMAL_QUOTIENTS = "subnormal-quotients"
+
+
+def pairs():
+    """Every record on every target; the long one, a billion cycles, on one ATmega2560 only."""
+    for target in TARGETS:
+        for record in RECORDS:
+            if (record.name, target.name) == ("long", "atmega2560-O2"):
+                continue
+            if record.name == SUBNORMAL_QUOTIENTS and target.machine == "avr":
+                continue  # its own test, below
+            yield pytest.param(record, target, id=f"{target.name}-{record.name}")
+
+
+@pytest.mark.parametrize(("record", "target"), list(pairs()))
+def test_every_target_gives_the_bits_of_python(record, target, replay, expected):
+    found = trace_of(replay(target, record.to_bytes()), record)
+    wanted = expected(record)
+    difference = first_difference(wanted, found)
+    assert difference is None, (
+        f"{record.name} on {target.name}: {differing_bits(wanted, found)} bits differ; {difference}"
+    )
+
+
+def test_the_one_known_disagreement_is_still_there(replay, expected):
+    """Quotients below 1.2e-38 are what the promise of equal bits excludes.
+
+    When this fails, avr-libc has been mended: give the record to all targets.
+    """
+    record = BY_NAME[SUBNORMAL_QUOTIENTS]
+    found = trace_of(replay(TARGET["atmega2560-ide"], record.to_bytes()), record)
+    assert first_difference(expected(record), found) is not None
+
+
+@pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.name)
+def test_the_self_test_passes_on_every_target(target, replay):
+    assert self_test_of(replay(target, SELF_TEST)) == (SelfTestPart.none, 0)
+
+
+def self_test_of(trace):
+    failed, index = np.frombuffer(trace, "<u4")
+    return SelfTestPart(int(failed)), int(index)
+
+
+def test_the_golden_values_are_those_of_the_headers():
+    header = golden.HEADER.read_text(encoding="utf-8")
+    assert golden.with_values(header, *golden.golden_values()) == header, (
+        "if the arithmetic was meant to change: python -m firmware.parity.golden"
+    )
+
+
+# ---- Negative controls: builds that do not keep the bits -----------------------------------------
+
+LIBM = f"-I{CONTROLS / 'libm'}"
+FUSED = ("-ffp-contract=fast", "-mfma")
+GCC, CLANG = "gcc-O3-march=native", "clang-O3-march=native"
+
+# What is done to which target, and the part of the self-test that must notice. The preprocessor
+# does not see these, so config.hpp cannot refuse them.
+BROKEN = {
+    "libm on the host": (GCC, SelfTestPart.math, LIBM),
+    "libm of avr-libc": ("atmega2560-ide", SelfTestPart.math, LIBM),
+    "libm of newlib": ("cortex-m4f", SelfTestPart.math, LIBM),
+    "fused by gcc": (GCC, SelfTestPart.contraction, *FUSED),
+    "fused by clang": (CLANG, SelfTestPart.contraction, *FUSED),
+    "fused on Cortex-M4F": ("cortex-m4f", SelfTestPart.contraction, "-ffp-contract=fast"),
+    "rounding upward": ("gcc-O0", SelfTestPart.rounding, CONTROLS / "round_upward.cpp"),
+    "flushed on the host": (GCC, SelfTestPart.subnormals, CONTROLS / "flush_subnormals.cpp"),
+    "flushed on Cortex-M4F": (
+        *("cortex-m4f", SelfTestPart.subnormals, CONTROLS / "flush_subnormals.cpp"),
+    ),
+    "x87": (GCC, SelfTestPart.expression, "-mfpmath=387", f"-I{CONTROLS / 'x87'}"),
+    "reordered by clang": (CLANG, SelfTestPart.expression, "-funsafe-math-optimizations"),
+    "reordered by avr-gcc": (
+        *("atmega2560-O2", SelfTestPart.expression, "-funsafe-math-optimizations"),
+    ),
+    "without NaN by clang": (CLANG, SelfTestPart.expression, "-fno-honor-nans"),
+    "without signs of zeros": (GCC, SelfTestPart.expression, "-fno-signed-zeros"),
+}
+
+
+@pytest.mark.parametrize("broken", BROKEN)
+def test_what_breaks_the_bits_is_noticed(broken, replay, expected):
+    name, part, *extra = BROKEN[broken]
+    failed, _ = self_test_of(replay(TARGET[name], SELF_TEST, *extra))
+    assert failed == part
+    shows = (
+        record.name
+        for record in RECORDS
+        if replay(TARGET[name], record.to_bytes(), *extra) != bytes_of(expected(record))
+    )
+    assert next(shows, None) is not None, "no record shows it"
+
+
+# ---- The records do what they are for ------------------------------------------------------------
+
+
+@pytest.mark.parametrize("record", RECORDS, ids=lambda record: record.name)
+def test_refused_calls_leave_the_bits(record, expected):
+    trace = expected(record)
+    for before, after, step in zip(trace[:-1], trace[1:], record.steps[1:], strict=True):
+        untouched = after["predict"] and (after["update"] or _is_missing(after))
+        if untouched:
+            assert np.array_equal(before["x"], after["x"])
+            assert np.array_equal(before["P"], after["P"])
+        if after["feedback"] or not step["flags"] & REFERENCED:
+            assert before["interval"] == after["interval"]
+
+
+def _is_missing(row):
+    return row["nis"] == 0x7FC00000
+
+
+def test_the_records_reach_every_status_and_the_corners(expected):
+    traces = {record.name: expected(record) for record in RECORDS}
+    reached = {name: set(np.unique(t["predict"])) for name, t in traces.items()}
+    predict = set().union(*reached.values())
+    update = {int(s) for t in traces.values() for s in np.unique(t["update"])}
+    feedback = {int(s) for t in traces.values() for s in np.unique(t["feedback"])}
+    ok, not_finite = int(Status.ok), int(Status.not_finite)
+    assert predict == {ok, not_finite, int(Status.time_backwards), int(Status.overflow)}
+    assert update >= {ok, not_finite, int(Status.overflow)}
+    assert feedback == {ok, not_finite}
+    for name in ("paper-normal", "near-ukf-exact-0", "station-aukf", "long"):
+        near = traces[name]["near_field"]
+        assert 0 < near.sum() < len(near), f"{name} must be near the station and away from it"
+    for name in ("dying-ekf", "scale-ukf-1e-17", "intervals-aukf-exact"):
+        bits = traces[name]["P"] & 0x7FFFFFFF
+        assert ((bits > 0) & (bits < 0x00800000)).any(), f"{name} must have subnormal numbers"
+    assert _is_missing(traces["gaps"]).any()
+    refused = traces["refusals-ukf"]
+    assert ((refused["predict"] > 0) & (refused["update"] > 0)).any()
+    assert ((refused["predict"] > 0) & _is_missing(refused)).any()
+    assert len(set(traces["paper-normal"]["interval"])) > 20, "the interval must adapt"
+
+
+# ---- The comparison itself -----------------------------------------------------------------------
+
+
+def test_a_difference_names_step_field_values_and_distance():
+    a = np.zeros(3, TRACE)
+    a["x"] = 0x3F800000
+    b = a.copy()
+    assert first_difference(a, b) is None
+    b["x"][2, 4] = 0x3F800002
+    b["nis"][2] = 7
+    assert first_difference(a, b) == (
+        "step 2, x[4]: expected 1.0 (0x3f800000), found 1.0000002 (0x3f800002), 2 ulp apart"
+    )
+    assert differing_bits(a, b) == 4
+    b = a.copy()
+    b["feedback"][1] = 2
+    assert first_difference(a, b) == "step 1, feedback: expected 0, found 2"
+
+
+def test_minus_zero_and_nan_are_differences():
+    a = np.zeros(1, TRACE)
+    for other in (0x80000000, 0x7FC00000, 0x7FC00001):
+        b = a.copy()
+        b["P"][0, 3] = other
+        assert first_difference(a, b) is not None
+        assert first_difference(b, b) is None
+
+
+def test_ulps_count_across_zero():
+    assert ulps(np.uint32(1), np.uint32(0x80000001)) == 2
+    assert ulps(np.uint32(0x3F7FFFFF), np.uint32(0x3F800000)) == 1
+    assert ulps(np.uint32(0), np.uint32(0x80000000)) == 0

@@ -1,0 +1,411 @@
+"""Recording a board: its text, a serial port with a board behind it, and all that can go wrong.
+
+The real sketch on the simulated board is recorded in tests/firmware.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import signal
+import struct
+import subprocess
+import sys
+import termios
+import threading
+import time
+import tty
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+from auvest import board, telemetry
+from auvest.cli import app
+from auvest.commands import capture
+from auvest.commands.capture import SimulatedSonar
+from auvest.scenarios.tracking import Noise, Track
+from auvest.telemetry import LineError, Reader
+
+COLUMNS = (
+    "sample,time_s,dt_s,range_m,bearing_rad,desired_x_m,desired_y_m,x_m,y_m,vx_m_s,vy_m_s,"
+    "ax_m_s2,ay_m_s2,P00_m2,P10_m2,P11_m2,nis,interval_s,status,missed,refused,late,awake_us"
+)
+HEADER = f"# columns: {COLUMNS}"
+
+
+def bits(value: float) -> str:
+    return struct.pack(">f", value).hex()
+
+
+def sample_line(k: int, missing: bool = False) -> str:
+    """Write the line that the sketch sends for a sample."""
+    z = ["", ""] if missing else [bits(0.5 * k), bits(1.1)]
+    state = [bits(v) for v in (k / 3, 0.2 * k, 0.1, 0.2, 0.01, 0.02)]
+    cells = [
+        str(k), f"{0.5 * k:.6f}", bits(0.5), *z, bits(0.1 * k), bits(0.2 * k), *state,
+        bits(1e-7), bits(0.0), bits(4e-4), "" if missing else bits(1.5), bits(0.5),
+        "0", str(int(missing)), "0", "0", "15000",
+    ]  # fmt: skip
+    return telemetry.frame(",".join(["AUV", *cells]))
+
+
+def plain(text: str) -> str:
+    return " ".join("".join(c if c.isascii() else " " for c in text).split())
+
+
+def call(*arguments: str) -> Result:
+    return CliRunner().invoke(app, ["capture", *arguments])
+
+
+# ---- Text ----------------------------------------------------------------------------------------
+
+
+def test_checksum_is_that_of_nmea() -> None:
+    # The example that every description of NMEA 0183 has.
+    body = "GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,"
+    assert telemetry.frame(body) == f"${body}*47"
+    assert telemetry.body_of(f"${body}*47") == body
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["", "$", "$AUV", "AUV*55", "$AUV*", "$AUV*5", "$AUV*zz", "$AUV*00", "$AUV*4055", "x$AUV*55",
+     "$A$UV*55", "$AUV*55\r"],
+)  # fmt: skip
+def test_a_line_that_is_not_whole_is_refused(line: str) -> None:
+    assert telemetry.body_of(telemetry.frame("AUV")) == "AUV"
+    with pytest.raises(LineError):
+        telemetry.body_of(line)
+
+
+def test_every_changed_character_is_noticed() -> None:
+    line = sample_line(3)
+    reader = Reader()
+    reader.read(HEADER)
+    assert reader.read(line) is not None
+    for i in range(len(line)):
+        changed = line[:i] + chr(ord(line[i]) ^ 1) + line[i + 1 :]
+        if changed.lower() == line.lower():
+            continue  # a checksum may be written in either case
+        with pytest.raises(LineError):
+            reader.read(changed)
+
+
+def test_numbers_keep_their_bits() -> None:
+    reader = Reader()
+    reader.read("# columns: sample,time_s,a,b,c,d,e")
+    row = reader.read(telemetry.frame("AUV,12345678,12345678.5,33d6bf95,80000000,,1.25,ovf"))
+    assert row is not None
+    assert row["sample"] == 12345678  # eight digits, and yet a whole number
+    assert row["time_s"] == 12345678.5
+    assert row["a"] == float(np.float32(1e-7))
+    assert math.copysign(1, row["b"]) == -1
+    assert math.isnan(row["c"])
+    assert row["d"] == 1.25
+    assert math.isnan(row["e"])  # what Arduino prints for more than 2^32
+
+
+def test_samples_need_the_names_of_their_columns() -> None:
+    reader = Reader()
+    with pytest.raises(LineError, match="reset the board"):
+        reader.read(sample_line(1))
+    reader.read(HEADER)
+    with pytest.raises(LineError, match="2 values for 23 columns"):
+        reader.read(telemetry.frame("AUV,1,2"))
+    with pytest.raises(LineError, match="not a number"):
+        reader.read(telemetry.frame("AUV," + ",".join(["one"] * 23)))
+
+
+def test_other_lines_are_no_samples() -> None:
+    reader = Reader()
+    for line in ("", "# bytes of RAM never used: 5000", telemetry.frame("PING,3")):
+        assert reader.read(line) is None
+
+
+def test_requests() -> None:
+    assert telemetry.requested_sample(telemetry.frame("PING,17")) == 17
+    for line in ("$PING,17*00", "$PING,", telemetry.frame("PING,x"), sample_line(1), "#"):
+        assert telemetry.requested_sample(line) is None
+    assert telemetry.answer(17, 1.5, -0.25) == telemetry.frame("SONAR,17,1.500000,-0.250000")
+
+
+# ---- The simulated sonar -------------------------------------------------------------------------
+
+
+def test_simulated_sonar_measures_the_track() -> None:
+    sonar = SimulatedSonar(Noise(range_m=0.0, bearing_rad=0.0))
+    assert sonar.measure(1, 100.0) is not None  # half a second after the start of the track
+    text, delay_s = sonar.measure(2, 110.0) or ("", 0.0)
+    x, y = Track(kind="straight").position_at(10.5)
+    assert sonar.truth[2] == (x, y)
+    distance = math.hypot(x - 0.2, y - 2.0)
+    assert text == telemetry.answer(2, distance, math.atan2(y - 2.0, x - 0.2))
+    assert delay_s == pytest.approx(2e-3 + 2 * distance / 1500)
+
+
+@pytest.mark.parametrize("kind", ["normal", "uniform", "lognormal"])
+@pytest.mark.parametrize("centred", [False, True])
+def test_simulated_noise_has_the_stated_moments(kind: str, centred: bool) -> None:
+    noise = Noise(kind=kind, range_m=0.05, bearing_rad=0.01, centred=centred)  # type: ignore[arg-type]
+    sonar = SimulatedSonar(noise, seed=3)
+    draws = np.array([sonar._draw()[:2] for _ in range(40_000)])
+    # Four standard errors; those of a lognormal's deviation are large.
+    for i in range(2):
+        sigma = noise.standard_deviation[i]
+        assert draws[:, i].mean() == pytest.approx(noise.mean[i], abs=4 * sigma / 200)
+        assert draws[:, i].std() == pytest.approx(sigma, rel=0.15)
+
+
+def test_dropouts_and_seeds() -> None:
+    def answers(seed: int, dropout: float) -> list[object]:
+        sonar = SimulatedSonar(Noise(dropout=dropout), seed=seed)
+        return [sonar.measure(k, float(k)) for k in range(1000)]
+
+    lost = answers(1, 0.3).count(None)
+    assert lost == pytest.approx(300, abs=60)
+    assert answers(1, 0.0) == answers(1, 0.0)
+    assert answers(1, 0.0) != answers(2, 0.0)
+    assert None not in answers(1, 0.0)
+
+
+# ---- A board behind a serial port ----------------------------------------------------------------
+
+
+class PortWithBoard:
+    """A pseudo-terminal; a thread speaks as the board. Answers that it gets are kept."""
+
+    def __init__(self) -> None:
+        self.master, slave = os.openpty()
+        tty.setraw(slave)
+        self.name = os.ttyname(slave)
+        self.slave = slave
+        self.answers: list[str] = []
+
+    def speak(self, script: Callable[[PortWithBoard], None]) -> None:
+        threading.Thread(target=self._speak, args=(script,), daemon=True).start()
+
+    def _speak(self, script: Callable[[PortWithBoard], None]) -> None:
+        self.wait_until_open()
+        script(self)
+
+    def wait_until_open(self) -> None:
+        """Whoever opens the port sets its speed, and then throws away what came before."""
+        while termios.tcgetattr(self.slave)[4] != termios.B115200:
+            time.sleep(0.02)
+        time.sleep(0.2)
+
+    def say(self, text: str, end: str = "\r\n") -> None:
+        os.write(self.master, (text + end).encode("latin-1"))
+
+    def listen(self) -> None:
+        received = b""
+        while not received.endswith(b"\n"):
+            received += os.read(self.master, 1)
+        self.answers.append(received.decode().strip())
+
+    def unplug(self) -> None:
+        os.close(self.master)
+        self.master = -1
+
+
+@pytest.fixture
+def port() -> Iterator[PortWithBoard]:
+    port = PortWithBoard()
+    yield port
+    os.close(port.slave)
+    if port.master >= 0:
+        os.close(port.master)
+
+
+def test_port_is_recorded_to_the_bit(port: PortWithBoard, tmp_path: Path) -> None:
+    def script(board: PortWithBoard) -> None:
+        board.say("ra,1*22")  # the rest of a line that began before we listened
+        board.say("# auvest tracking_loop")
+        board.say(HEADER)
+        for k in range(1, 6):
+            board.say(telemetry.frame(f"PING,{k}"))
+            line = sample_line(k, missing=k == 3)
+            board.say(line[:20], end="")  # lines come in pieces
+            time.sleep(0.15)
+            board.say(line[20:])
+            board.say(line[:-1] + "?")  # and damaged
+
+    port.speak(script)
+    output = tmp_path / "dive"
+    result = call("--port", port.name, "--steps", "5", "--output", str(output), "--json")
+    assert result.exit_code == 0, result.output
+    values = json.loads(result.stdout)["results"]
+    assert (values["samples"], values["missed"]) == (5, 0)  # the last line says 0 missed
+    assert values["damaged_lines"] in (5, 6)  # the last may come after we have left
+    assert values["awake_share_by_board"] == pytest.approx(0.03)  # 15 ms of 0.5 s
+    assert values["awake_share_simulated"] is None
+    assert values["rmse_m"] is None
+
+    header, *rows = (output / "record.csv").read_text().splitlines()
+    assert header == COLUMNS
+    table = [dict(zip(COLUMNS.split(","), row.split(","), strict=True)) for row in rows]
+    assert [row["time_s"] for row in table] == ["0.5", "1", "1.5", "2", "2.5"]
+    for k, row in enumerate(table, start=1):
+        assert np.float32(row["P00_m2"]) == np.float32(1e-7)
+        assert np.float32(row["x_m"]) == np.float32(k / 3)
+    assert table[2]["range_m"] == table[2]["nis"] == ""
+    assert sorted(path.name for path in output.iterdir()) == [
+        "figure.png", "record.csv", "results.json",
+    ]  # fmt: skip
+
+
+def test_play_sonar_answers_each_request(port: PortWithBoard, tmp_path: Path) -> None:
+    def script(board: PortWithBoard) -> None:
+        board.say(HEADER)
+        for k in range(1, 4):
+            board.say(telemetry.frame(f"PING,{k}"))
+            board.listen()
+            board.say(sample_line(k))
+
+    port.speak(script)
+    result = call(
+        "--port", port.name, "--play-sonar", "--steps", "3", "--no-figure",
+        "--output", str(tmp_path),
+    )  # fmt: skip
+    assert result.exit_code == 0, result.output
+    assert "position RMSE" in plain(result.stdout)
+    assert [telemetry.body_of(a).split(",")[:2] for a in port.answers] == [
+        ["SONAR", "1"], ["SONAR", "2"], ["SONAR", "3"],
+    ]  # fmt: skip
+    assert "true_x_m" in (tmp_path / "record.csv").read_text().splitlines()[0]
+
+
+def test_an_unplugged_board_keeps_its_samples(port: PortWithBoard, tmp_path: Path) -> None:
+    def script(board: PortWithBoard) -> None:
+        board.say(HEADER)
+        for k in range(1, 4):
+            board.say(sample_line(k))
+        time.sleep(0.3)
+        board.unplug()
+
+    port.speak(script)
+    result = call("--port", port.name, "--output", str(tmp_path), "--no-figure")
+    assert result.exit_code == 1
+    assert "the samples until then are kept" in plain(result.stderr)
+    assert len((tmp_path / "record.csv").read_text().splitlines()) == 4
+    assert json.loads((tmp_path / "results.json").read_text())["complete"] is False
+
+
+def test_a_silent_port(
+    port: PortWithBoard, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(capture, "SILENCE_S", 0.3)
+    result = call("--port", port.name, "--output", str(tmp_path))
+    assert result.exit_code == 1
+    assert "no sample has come" in plain(result.stderr)
+    assert "no sample for 0.3 s" in plain(result.stderr)
+    assert "115200 baud?" in plain(result.stderr)
+    assert not (tmp_path / "record.csv").exists()
+
+
+def test_a_board_that_was_not_reset(
+    port: PortWithBoard, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its samples have come without the names of their columns: say what helps."""
+    monkeypatch.setattr(capture, "SILENCE_S", 0.5)
+
+    def script(board: PortWithBoard) -> None:
+        for k in range(1, 6):
+            board.say(telemetry.frame(f"PING,{k}"))
+            board.say(sample_line(k))
+
+    port.speak(script)
+    result = call("--port", port.name, "--output", str(tmp_path))
+    assert result.exit_code == 1
+    assert "reset the board" in plain(result.stderr)
+
+
+def test_a_record_from_a_board_is_never_overwritten(port: PortWithBoard, tmp_path: Path) -> None:
+    (tmp_path / "record.csv").write_text("precious")
+    result = call("--port", port.name, "--output", str(tmp_path))
+    assert result.exit_code == 2
+    assert "choose another --output" in plain(result.stderr)
+    assert (tmp_path / "record.csv").read_text() == "precious"
+
+
+@pytest.mark.parametrize(("steps", "code"), [((), 0), (("--steps", "9"), 130)])
+def test_interrupt_keeps_all_that_has_come(
+    port: PortWithBoard, tmp_path: Path, steps: tuple[str, ...], code: int
+) -> None:
+    """Without --steps Ctrl-C is how a recording ends; with it, it is an interruption."""
+    command = [sys.executable, "-m", "auvest", "capture", "--port", port.name, *steps]
+    with subprocess.Popen(
+        [*command, "--output", str(tmp_path), "--no-figure"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    ) as process:  # fmt: skip
+        record = tmp_path / "record.csv"
+        deadline = time.monotonic() + 60
+        port.wait_until_open()
+        port.say(HEADER)
+        for k in range(1, 4):
+            port.say(sample_line(k))
+        while len(record.read_text().splitlines()) < 4 and time.monotonic() < deadline:
+            time.sleep(0.05)  # each sample is on the disk before the command has ended
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+    assert process.returncode == code, err
+    assert "3 samples" in plain(out)
+    assert ("interrupted: 3 of 9" in plain(err)) == (code == 130)
+
+
+# ---- Wrong usage ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([], ["--port", "--simulator", "one of the two"]),
+        (["--port", "p", "--simulator", __file__], ["one of the two"]),
+        (["--port", "p", "--noise", "uniform"], ["--noise", "--play-sonar"]),
+        (["--port", "p", "--range-noise", "1"], ["--range-noise", "--play-sonar"]),
+        (["--port", "p", "--seed", "2"], ["--seed", "--play-sonar"]),
+        (["--simulator", __file__, "--baud", "9600"], ["--baud", "--port"]),
+        (["--simulator", __file__, "--play-sonar"], ["--play-sonar", "--port"]),
+        (["--simulator", "no-such.elf"], ["--simulator", "no-such.elf"]),
+        (["--simulator", __file__, "--dropout", "1"], ["--dropout", "probability"]),
+        (["--simulator", __file__, "--range-noise", "nan"], ["--range-noise", "finite"]),
+        (["--simulator", __file__, "--steps", "0"], ["--steps"]),
+    ],
+)
+def test_wrong_usage_names_the_option(
+    arguments: list[str], words: list[str], tmp_path: Path
+) -> None:
+    result = call(*arguments, "--output", str(tmp_path))
+    assert result.exit_code == 2
+    for word in words:
+        assert word in plain(result.stderr)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_port_that_is_not_there(tmp_path: Path) -> None:
+    result = call("--port", "/dev/no-such-port", "--output", str(tmp_path))
+    assert result.exit_code == 1
+    assert "/dev/no-such-port" in plain(result.stderr)
+
+
+def test_without_pyserial_the_extra_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "serial", None)
+    result = call("--port", "/dev/ttyACM0", "--output", str(tmp_path))
+    assert result.exit_code == 1
+    assert "pip install 'auvest[serial]'" in plain(result.stderr)
+
+
+def test_without_the_simulator_its_build_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("AUVEST_BOARD", "no-such-runner")
+    monkeypatch.setattr(board.shutil, "which", lambda _: None)  # type: ignore[attr-defined]
+    result = call("--simulator", __file__, "--output", str(tmp_path))
+    assert result.exit_code == 1
+    assert "AUVEST_BUILD_FIRMWARE" in plain(result.stderr)
