@@ -50,18 +50,21 @@ class Target:
         Its flags, but for the include paths.
     machine : {"host", "avr", "mps2-an385", "mps2-an386"}
         The computer itself, the simulated ATmega2560 board or a board of QEMU.
+    library : tuple of Path
+        What the Arduino library compiles beside the headers.
     """
 
     name: str
     compiler: str
     flags: tuple[str, ...]
     machine: Literal["host", "avr", "mps2-an385", "mps2-an386"]
+    library: tuple[Path, ...] = ()
 
     @property
     def sources(self) -> tuple[Path, ...]:
         """What is compiled."""
         if self.machine == "avr":
-            return (HERE / "avr.cpp",)
+            return (HERE / "avr.cpp", *self.library)
         if self.machine == "host":
             return (HERE / "host.cpp",)
         return (HERE / "host.cpp", HERE / "cortex_m.cpp")
@@ -143,10 +146,10 @@ def _host(compiler: str, *flags: str) -> Target:
     return Target(name, compiler, (*flags, *common), "host")
 
 
-def _avr(name: str, *flags: str) -> Target:
+def _avr(name: str, *flags: str, library: tuple[Path, ...] = ()) -> Target:
     chip = ("-mmcu=atmega2560", "-DF_CPU=16000000UL")
     common = (*chip, "-std=gnu++11", "-fno-exceptions", *flags, *_WARNINGS)
-    return Target(name, "avr-g++", common, "avr")
+    return Target(name, "avr-g++", common, "avr", library)
 
 
 def _cortex(name: str, machine: Literal["mps2-an385", "mps2-an386"], *flags: str) -> Target:
@@ -160,11 +163,12 @@ TARGETS = (
     _host("g++", "-O3", "-march=native"),
     _host("clang++", "-O0"),
     _host("clang++", "-O3", "-march=native"),
-    # As the Arduino IDE compiles a sketch, and for speed.
+    # As the Arduino IDE compiles a sketch, with the library's float routines; and with avr-libc's.
     _avr(
         "atmega2560-ide",
         *("-Os", "-flto", "-fuse-linker-plugin", "-fpermissive", "-fno-threadsafe-statics"),
         *("-ffunction-sections", "-fdata-sections", "-Wl,--gc-sections"),
+        library=(ROOT / "firmware" / "library" / "src" / "avr_float.S",),
     ),
     _avr("atmega2560-O2", "-O2"),
     _cortex("cortex-m4f", "mps2-an386", "-mcpu=cortex-m4", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"),

@@ -1,0 +1,113 @@
+"""The library's own float routines for AVR: the bits of IEEE 754, as NumPy has them."""
+
+import numpy as np
+
+pytest_plugins = ["board_support"]
+
+PROGRAM = """
+#include "board.hpp"
+
+float read() {
+  union { uint8_t bytes[4]; float value; } word;
+  for (uint8_t i = 0; i < 4; ++i) word.bytes[i] = board::read();
+  return word.value;
+}
+
+void write(float value) {
+  union { float value; uint8_t bytes[4]; } word = {value};
+  for (uint8_t i = 0; i < 4; ++i) board::write(word.bytes[i]);
+}
+
+int main() {
+  for (uint32_t count = COUNT; count > 0; --count) {
+    volatile float a = read();
+    volatile float b = read();
+    board::begin(1);
+    volatile float product = a * b;
+    board::end(1);
+    board::begin(2);
+    volatile float sum = a + b;
+    board::end(2);
+    write(product);
+    write(sum);
+    write(a - b);
+  }
+  board::finish();
+}
+"""
+
+# Zero, subnormals, both sides of the ends of the range and of 1, infinity, NaN.
+SPECIAL = np.array(
+    [
+        *(0x00000000, 0x00000001, 0x007FFFFF, 0x00800000, 0x00800001, 0x0F800000, 0x10000000),
+        *(0x3F7FFFFF, 0x3F800000, 0x3F800001, 0x3FFFFFFF, 0x40000000),
+        *(0x7E7FFFFF, 0x7F000000, 0x7F7FFFFF, 0x7F800000, 0x7FC00000),
+    ],
+    "<u4",
+)
+
+
+def operands():
+    """Pairs of floats: any bits, neighbours in size, and every pair of special values."""
+    rng = np.random.default_rng(1)
+    count = 150_000
+    any_bits = rng.integers(0, 1 << 32, (count, 2), dtype="<u4")
+    # Exponents that differ by at most 27, where addition rounds, cancels and carries; mantissas
+    # with long runs of ones and zeros, where ties are.
+    exponent = rng.integers(28, 227, (count, 1)) + rng.integers(0, 28, (count, 2))
+    bits = rng.integers(0, 1 << 23, (count, 2))
+    run = rng.integers(0, 24, (count, 2))
+    mantissa = np.where(rng.random((count, 2)) < 0.5, bits, bits >> run << run)
+    mantissa = np.where(rng.random((count, 2)) < 0.2, (1 << 23) - 1 - mantissa, mantissa)
+    sign = rng.integers(0, 2, (count, 2))
+    near = (sign << 31 | exponent << 23 | mantissa).astype("<u4")
+    # Sums at or next to a tie, half of them with a carry out of the first place.
+    shift = rng.integers(1, 25, 60_000)
+    low = (1 << shift >> rng.integers(0, 3, shift.size)) + rng.integers(-1, 2, shift.size)
+    small = rng.integers(0, 1 << 23, shift.size) >> shift << shift | low & ((1 << 23) - 1)
+    large = rng.integers(0, 1 << 23, shift.size) | rng.integers(0, 2, shift.size) * 0x7F0000
+    exponent = rng.integers(60, 200, shift.size)
+    ties = np.stack([(exponent + shift) << 23 | large, exponent << 23 | small], -1)
+    # A few units in the last place apart, of the opposite sign: cancellation.
+    close = near[:20_000].copy()
+    close[:, 1] = (close[:, 0] ^ 0x80000000) + rng.integers(-40, 40, len(close))
+    signed = np.concatenate([SPECIAL, SPECIAL | 0x80000000])
+    special = np.stack(np.meshgrid(signed, signed), -1).reshape(-1, 2)
+    return np.concatenate([any_bits, near, ties, close, special]).astype("<u4").view("<f4")
+
+
+def test_products_sums_and_differences_are_rounded_as_ieee_754_says(
+    compile_avr, run_board, root, tmp_path
+):
+    pairs = operands()
+    elf = compile_avr(PROGRAM, f"-DCOUNT={len(pairs)}UL", root / "firmware/library/src/avr_float.S")
+    record = tmp_path / "operands.bin"
+    record.write_bytes(pairs.tobytes())
+    run = run_board(elf, "--input", record, "--limit", "1000")
+    found = np.frombuffer(run.output, "<f4").reshape(-1, 3)
+    assert len(found) == len(pairs)
+    a, b = pairs.T
+    with np.errstate(all="ignore"):
+        wanted = np.stack([a * b, a + b, a - b], axis=-1)
+    same = (found.view("<u4") == wanted.view("<u4")) | (np.isnan(found) & np.isnan(wanted))
+    wrong = np.argwhere(~same)
+    assert wrong.size == 0, f"{len(wrong)} wrong, first: {pairs[wrong[0, 0]]} op {wrong[0, 1]}"
+
+
+def test_they_are_faster_than_those_of_the_toolchain(compile_avr, run_board, root, tmp_path):
+    rng = np.random.default_rng(2)
+    pairs = rng.uniform(-10, 10, (2_000, 2)).astype("<f4")
+    record = tmp_path / "operands.bin"
+    record.write_bytes(pairs.tobytes())
+    cycles = {}
+    for name, sources in {
+        "ours": [root / "firmware/library/src/avr_float.S"],
+        "theirs": [],
+    }.items():
+        elf = compile_avr(PROGRAM, "-DCOUNT=2000", *sources)
+        sections = run_board(elf, "--input", record).report.sections
+        cycles[name] = [sections[1].median, sections[2].median]
+    (product, total), (their_product, their_total) = cycles.values()
+    # 32 cycles of each are loads and stores of the test's.
+    assert product < 0.85 * their_product, cycles
+    assert total < 0.95 * their_total, cycles
