@@ -67,8 +67,8 @@ struct MahalanobisInterval {
     memory.tau = params.tau0;
     memory.interval = params.initial_s;
     memory.ratio = memory.mahalanobis_squared = Scalar(0);
-    memory.last_estimate = estimate;
-    memory.last_reference = reference;
+    math::copy(estimate, memory.last_estimate);
+    math::copy(reference, memory.last_reference);
   }
 
   template <class Filter>
