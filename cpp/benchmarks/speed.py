@@ -91,7 +91,7 @@ def run_auvest(z: np.ndarray, dtype: str) -> np.ndarray:
         kappa=KAPPA,
         dtype=dtype,
     )
-    return ukf.run(z, DT, covariance=False).x
+    return ukf.run(z, dt=DT, covariance=False).x
 
 
 def run_filterpy(z: np.ndarray) -> np.ndarray:

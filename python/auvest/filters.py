@@ -98,7 +98,7 @@ class GaussianFilter:
         process: ConstantAcceleration,
         measurement: RangeBearing,
         dtype: npt.DTypeLike,
-        interval: IntervalPolicy,
+        policy: IntervalPolicy,
         parameters: dict[str, float],
         reference: npt.ArrayLike | None = None,
     ) -> None:
@@ -112,7 +112,7 @@ class GaussianFilter:
         )
         self._process: ConstantAcceleration = as_instance("process", process, ConstantAcceleration)
         self._measurement: RangeBearing = as_instance("measurement", measurement, RangeBearing)
-        self._interval = interval
+        self._policy = policy
         self._parameters = parameters
         self._prepare()
         try:
@@ -129,19 +129,19 @@ class GaussianFilter:
     def _prepare(self) -> None:
         self._exclusive = Exclusive()
         self._sensor = core_sensor(self._measurement, self._dtype.name)
-        self._filter = self._build(self._interval)
+        self._filter = self._build(self._policy)
         self._status = Status.ok
         self._forget()
 
-    def _build(self, interval: IntervalPolicy) -> _Filter[Any]:
+    def _build(self, policy: IntervalPolicy) -> _Filter[Any]:
         """Make a filter of the core with this one's models and parameters and the policy given."""
         name = f"{self._core_name}_{self._process.discretisation}_{self._dtype.name}"
         core = getattr(_core, name)
         process = core_process(self._process, self._dtype.name)
-        policy = core_interval(interval, self._dtype.name)
+        core_policy = core_interval(policy, self._dtype.name)
         require_range(self._parameters, self._dtype.name)
         try:
-            built: _Filter[Any] = core(process, policy, self._parameters)
+            built: _Filter[Any] = core(process, core_policy, self._parameters)
         except _core.StatusError as error:
             given = ", ".join(f"{name}={value}" for name, value in self._parameters.items())
             raise ValueError(f"{given} do not suit {self._dtype.name}: {error}") from None
@@ -302,7 +302,7 @@ class GaussianFilter:
             "dtype": self._dtype.name,
             "process": self._process,
             "measurement": self._measurement,
-            "interval": self._interval,
+            "policy": self._policy,
             "parameters": dict(self._parameters),
             "status": self._status,
             "state": self.save(),
@@ -312,7 +312,7 @@ class GaussianFilter:
         self._dtype = as_dtype(pickled["dtype"])
         self._process = pickled["process"]
         self._measurement = pickled["measurement"]
-        self._interval = pickled["interval"]
+        self._policy = pickled["policy"]
         self._parameters = pickled["parameters"]
         self._prepare()
         self.restore(pickled["state"])
@@ -322,9 +322,9 @@ class GaussianFilter:
         x = np.array2string(self.x, precision=4, separator=", ")
         return f"{type(self).__name__}(dtype={self._dtype.name}, x={x})"
 
-    def _prototype(self, interval: IntervalPolicy) -> tuple[_Filter[Any], Floats, Floats, Any]:
+    def _prototype(self, policy: IntervalPolicy) -> tuple[_Filter[Any], Floats, Floats, Any]:
         """Give a simulation the core filter, the x and P to start from and the sensor."""
-        return self._build(interval), self.x, self.P, self._sensor
+        return self._build(policy), self.x, self.P, self._sensor
 
     def _sensor_of(self, measurement: RangeBearing | None) -> Any:
         if measurement is None:
@@ -402,9 +402,9 @@ class _TimedFilter(GaussianFilter):
     def run(
         self,
         z: npt.ArrayLike,
+        *,
         dt: npt.ArrayLike,
         measurement: RangeBearing | None = None,
-        *,
         covariance: bool = True,
     ) -> RunResult:
         """Predict and update over a record, in C++ and without the GIL.
@@ -474,7 +474,7 @@ class Ekf(_TimedFilter):
             process=process,
             measurement=measurement,
             dtype=dtype,
-            interval=_FIXED,
+            policy=_FIXED,
             parameters={},
         )
 
@@ -542,7 +542,7 @@ class Ukf(_UnscentedFilter, _TimedFilter):
             process=process,
             measurement=measurement,
             dtype=dtype,
-            interval=_FIXED,
+            policy=_FIXED,
             parameters=_as_points(alpha, beta, kappa),
         )
 
@@ -557,7 +557,7 @@ class Aukf(_UnscentedFilter):
     ----------
     x0, P0, process, measurement, dtype, alpha, beta, kappa
         As for :class:`Ukf`.
-    interval : MahalanobisInterval, CovarianceBudget or FixedInterval
+    policy : MahalanobisInterval, CovarianceBudget or FixedInterval
         The interval policy; default: the paper's law, Eqs. (7) to (12).
     reference : array_like, shape (2,), optional
         Desired position (m) at the start; default: that of ``x0``.
@@ -579,7 +579,7 @@ class Aukf(_UnscentedFilter):
         alpha: float = _POINTS["alpha"],
         beta: float = _POINTS["beta"],
         kappa: float = _POINTS["kappa"],
-        interval: IntervalPolicy = _PAPERS_LAW,
+        policy: IntervalPolicy = _PAPERS_LAW,
         reference: npt.ArrayLike | None = None,
     ) -> None:
         policies = (MahalanobisInterval, CovarianceBudget, FixedInterval)
@@ -589,7 +589,7 @@ class Aukf(_UnscentedFilter):
             process=process,
             measurement=measurement,
             dtype=dtype,
-            interval=as_instance("interval", interval, policies),
+            policy=as_instance("policy", policy, policies),
             parameters=_as_points(alpha, beta, kappa),
             reference=reference,
         )
@@ -597,7 +597,7 @@ class Aukf(_UnscentedFilter):
     @property
     def policy(self) -> IntervalPolicy:
         """The interval policy."""
-        return self._interval
+        return self._policy
 
     @property
     def interval(self) -> float:
@@ -621,9 +621,9 @@ class Aukf(_UnscentedFilter):
         return self._law("mahalanobis_squared")
 
     def _law(self, name: str) -> float:
-        if not isinstance(self._interval, MahalanobisInterval):
-            policy = type(self._interval).__name__
-            raise AttributeError(f"{name} belongs to MahalanobisInterval; this filter has {policy}")
+        if not isinstance(self._policy, MahalanobisInterval):
+            kind = type(self._policy).__name__
+            raise AttributeError(f"{name} belongs to MahalanobisInterval; this filter has {kind}")
         with self._exclusive:
             return float(self._filter.law[name])
 
@@ -672,10 +672,10 @@ class Aukf(_UnscentedFilter):
     def run(
         self,
         z: npt.ArrayLike,
+        *,
         reference: npt.ArrayLike | None = None,
         dt: npt.ArrayLike | None = None,
         measurement: RangeBearing | None = None,
-        *,
         covariance: bool = True,
     ) -> RunResult:
         """Predict, update and feed back over a record, in C++ and without the GIL.

@@ -124,7 +124,7 @@ def on_the_desk():
             np.float32([0.2, 2.0, 0.1, 0.2, 0.01, 0.02]),
             np.diag(sigma * sigma),
             process=ConstantAcceleration(discretisation="euler"),
-            interval=policy,
+            policy=policy,
             alpha=np.float32(1e-6),
             dtype="float32",
         )

@@ -18,12 +18,12 @@ def replay_in_python(record: Record) -> np.ndarray:
     elif record.kind == "ukf":
         estimator = Ukf(record.x0, record.P0, **models, **record.points)
     else:
-        models["interval"] = record.interval
+        models["policy"] = record.policy
         estimator = Aukf(record.x0, record.P0, **models, **record.points)
     trace = np.zeros(len(record.steps), TRACE)
     for step, row in zip(record.steps, trace, strict=True):
         _take(estimator, step, row)
-        chosen = estimator.interval if record.kind == "aukf" else record.interval.interval_s
+        chosen = estimator.interval if record.kind == "aukf" else record.policy.interval_s
         row["interval"] = bits(chosen)
     return trace
 

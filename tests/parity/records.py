@@ -75,7 +75,7 @@ class Record:
     )
     process: ConstantAcceleration = field(default_factory=ConstantAcceleration)
     measurement: RangeBearing = field(default_factory=RangeBearing)
-    interval: IntervalPolicy = field(default_factory=MahalanobisInterval)
+    policy: IntervalPolicy = field(default_factory=MahalanobisInterval)
     alpha: float = 1e-6
     beta: float = 2.0
     kappa: float = -3.0
@@ -92,7 +92,7 @@ class Record:
         measurement = asdict(self.measurement)
         station = measurement.pop("station")
         measurement.update(station_x_m=station[0], station_y_m=station[1])
-        policy = asdict(self.interval)
+        policy = asdict(self.policy)
         policy.pop("preset", None)
         kind = _KINDS["ekf" if self.kind == "ekf" else "ukf", discretisation]
         # Parameters travel in the order in which the core names them.
@@ -100,13 +100,13 @@ class Record:
             FixedInterval: _core.fixed_interval_defaults(),
             MahalanobisInterval: _core.mahalanobis_interval_defaults("figure3"),
             CovarianceBudget: _core.covariance_budget_defaults(),
-        }[type(self.interval)]
+        }[type(self.policy)]
         parts = [
             np.array([kind, len(self.steps)], "<u4"),
             _in_order(self.points, _core.sigma_points_defaults()),
             _in_order(process, _core.constant_acceleration_defaults()),
             _in_order(measurement, _core.range_bearing_defaults()),
-            np.array([_POLICIES[type(self.interval)]], "<u4"),
+            np.array([_POLICIES[type(self.policy)]], "<u4"),
             _in_order(policy, defaults),
             np.array(self.x0, "<f4"),
             np.asarray(self.P0, "<f4")[LOWER],
@@ -173,7 +173,7 @@ def simulated(name: str, prototype: Aukf, scenario: Scenario) -> Record:
         P0=prototype.P,
         process=prototype.process,
         measurement=prototype.measurement,
-        interval=prototype.policy,
+        policy=prototype.policy,
         **{name: getattr(prototype, name) for name in ("alpha", "beta", "kappa")},
     )
 
@@ -205,7 +205,7 @@ def option_records() -> Iterator[Record]:
                     name=f"{name}-{process}-alpha{alpha:g}",
                     steps=steps,
                     process=model,
-                    interval=policy,
+                    policy=policy,
                     alpha=alpha,
                 )
         timed = make_steps(world.steps["z"], dt=0.4)
@@ -216,7 +216,7 @@ def option_records() -> Iterator[Record]:
                 kind=kind,
                 steps=timed,
                 process=model,
-                interval=FixedInterval(),
+                policy=FixedInterval(),
             )
 
 
@@ -251,13 +251,13 @@ def behind_the_station(kind, sign) -> Record:
     z[::3, 1] += 0.03 * sign
     z[5, 1], z[6, 1], z[7, 1], z[8, 1] = np.pi, -np.pi, 3 * np.pi, 40.0
     steps = make_steps(z, reference=positions if kind == "aukf" else None, dt=0.5)
-    interval = MahalanobisInterval() if kind == "aukf" else FixedInterval()
+    policy = MahalanobisInterval() if kind == "aukf" else FixedInterval()
     return Record(
         f"wrap-{kind}{'+' if sign > 0 else '-'}",
         steps,
         kind=kind,
         x0=(-4.0, 2.0 - 0.8 * sign, 0.0, 0.1 * sign, 0.0, 0.0),
-        interval=interval,
+        policy=policy,
     )
 
 
@@ -270,7 +270,7 @@ def past_the_station(kind, process, miss_m) -> Record:
         kind=kind,
         process=ConstantAcceleration(discretisation=process),
         x0=(-1.5, 2.0 + miss_m, 0.2, 0.0, 0.0, 0.0),
-        interval=CovarianceBudget() if kind == "aukf" else FixedInterval(),
+        policy=CovarianceBudget() if kind == "aukf" else FixedInterval(),
         alpha=1e-3,
     )
 
@@ -284,7 +284,7 @@ def on_the_station(kind) -> Record:
         kind=kind,
         x0=(0.2, 2.0, 0.0, 0.0, 0.0, 0.0),
         measurement=RangeBearing(near_field=0.0),
-        interval=MahalanobisInterval() if kind == "aukf" else FixedInterval(),
+        policy=MahalanobisInterval() if kind == "aukf" else FixedInterval(),
     )
 
 
@@ -313,7 +313,7 @@ def refusals(kind) -> Record:
         steps,
         kind=kind,
         x0=(3.0, -1.0, 0.1, 0.2, 0.0, 0.0),
-        interval=MahalanobisInterval() if kind == "aukf" else FixedInterval(),
+        policy=MahalanobisInterval() if kind == "aukf" else FixedInterval(),
     )
 
 
@@ -338,7 +338,7 @@ def scaled(kind, scale) -> Record:
         P0=np.diag(variances).astype(np.float32),
         process=process,
         measurement=RangeBearing(station=(0.0, 0.0), sigma_range_m=sigma_range_m),
-        interval=MahalanobisInterval() if kind == "aukf" else FixedInterval(),
+        policy=MahalanobisInterval() if kind == "aukf" else FixedInterval(),
         alpha=1e-3,
     )
 
@@ -358,7 +358,7 @@ def intervals(kind, process) -> Record:
         kind=kind,
         process=ConstantAcceleration(discretisation=process),
         x0=(3.0, -1.0, 0.1, 0.2, 0.0, 0.0),
-        interval=CovarianceBudget() if kind == "aukf" else FixedInterval(),
+        policy=CovarianceBudget() if kind == "aukf" else FixedInterval(),
     )
 
 
@@ -373,7 +373,7 @@ def dying(kind) -> Record:
         x0=(3.0, -1.0, 1e-12, 2e-13, 1e-38, 1e-42),
         P0=p0,
         process=ConstantAcceleration(position_psd=0.0, velocity_psd=0.0, acceleration_psd=0.0),
-        interval=MahalanobisInterval() if kind == "aukf" else FixedInterval(),
+        policy=MahalanobisInterval() if kind == "aukf" else FixedInterval(),
         alpha=1e-3,
     )
 
@@ -394,7 +394,7 @@ def random_bits(kind, seed) -> Record:
         steps,
         kind=kind,
         x0=(3.0, -1.0, 0.1, 0.2, 0.0, 0.0),
-        interval=MahalanobisInterval() if kind == "aukf" else FixedInterval(),
+        policy=MahalanobisInterval() if kind == "aukf" else FixedInterval(),
         alpha=1e-3,
     )
 

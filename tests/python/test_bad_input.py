@@ -122,10 +122,10 @@ CONSTRUCTORS = {
         r"process must be an auvest\.ConstantAcceleration, not str",
     ),
     "measurement": (ukf(measurement=None), TypeError, r"must be an auvest\.RangeBearing, not None"),
-    "interval": (
-        lambda: auvest.Aukf(X0, P0, interval=0.5),
+    "policy": (
+        lambda: auvest.Aukf(X0, P0, policy=0.5),
         TypeError,
-        r"interval must be an auvest\.MahalanobisInterval or .*, not float",
+        r"policy must be an auvest\.MahalanobisInterval or .*, not float",
     ),
     "reference": (
         lambda: auvest.Aukf(X0, P0, reference=[1, 2, 3]),
@@ -221,7 +221,7 @@ CONSTRUCTORS = {
     "tau_max": (law(tau_max=1), ValueError, r"tau_max < 1 is required"),
     "tau_max in float32": (
         lambda: auvest.Aukf(
-            X0, P0, dtype="float32", interval=auvest.MahalanobisInterval(tau_max=1 - 1e-12)
+            X0, P0, dtype="float32", policy=auvest.MahalanobisInterval(tau_max=1 - 1e-12)
         ),
         ValueError,
         r"MahalanobisInterval\(.*\) does not suit float32",
@@ -355,17 +355,17 @@ ADAPTIVE = {
     "reference NaN": (lambda f: f.feedback([NAN, NAN]), ValueError, r"reference\[0\] is nan"),
     "reference str": (lambda f: f.feedback("xy"), TypeError, "reference must be .*, not of str"),
     "run reference length": (
-        lambda f: f.run(Z, np.zeros((7, 2))),
+        lambda f: f.run(Z, reference=np.zeros((7, 2))),
         ValueError,
         "reference has 7 rows and z has 8; they must have the same",
     ),
     "run reference NaN": (
-        lambda f: f.run(Z, changed(Z, 1, NAN)),
+        lambda f: f.run(Z, reference=changed(Z, 1, NAN)),
         ValueError,
         r"reference\[1, 0\] is nan; all elements must be finite",
     ),
     "run reference wide": (
-        lambda f: f.run(Z, np.zeros((2, 8))),
+        lambda f: f.run(Z, reference=np.zeros((2, 8))),
         ValueError,
         r"reference has shape \(2, 8\), expected \(T, 2\)",
     ),

@@ -210,7 +210,7 @@ def test_reference_at_the_start_matters_to_the_law():
     "policy", [auvest.FixedInterval(interval_s=0.3), auvest.CovarianceBudget()]
 )
 def test_other_policies(policy):
-    f = make(auvest.Aukf, interval=policy)
+    f = make(auvest.Aukf, policy=policy)
     assert f.policy == policy
     f.predict()
     f.update([4.0, -0.8])
@@ -276,7 +276,7 @@ def test_start_on_the_station(case):
     truth = straight(100, STATION)
     z = measure(truth, seed=11)
     f = near_station(case, [*STATION, 0.1, 0.2, 0, 0], [0.01, 0.01, 0.01, 0.01, 1e-4, 1e-4])
-    result = f.run(z, 0.5)
+    result = f.run(z, dt=0.5)
     assert result.near_field[0]
     # Range 11 m at the end: 0.11 m across per measurement, averaged over some seconds.
     require_recovery(f, result, truth, 0.11)
@@ -310,7 +310,7 @@ def test_bearings_across_pi(case):
         [0.01, 0.01, 0.01, 0.01, 1e-4, 1e-4],
         process=auvest.ConstantAcceleration(velocity_psd=1e-2),
     )
-    result = f.run(z, 0.5)
+    result = f.run(z, dt=0.5)
     assert np.abs(result.innovation[:, 1]).max() < 0.2
     # Five times the 0.05 m of a fix at this range.
     assert np.hypot(*(result.x[:, :2] - truth).T).max() < 0.25
@@ -330,7 +330,7 @@ def test_range_below_a_micrometre(case):
         [0.01, 0.01, 0.01, 0.01, 1e-4, 1e-4],
         process=auvest.ConstantAcceleration(velocity_psd=1e-3),
     )
-    result = f.run(z, 0.5)
+    result = f.run(z, dt=0.5)
     assert result.near_field[:150].all()
     assert not result.near_field[-100:].any()
     # While it rests the fix is good to 0.05 m; four of them.
@@ -350,7 +350,7 @@ def test_sigma_points_on_both_sides_of_the_station(case, near_field):
         [25.0, 25.0, 0.04, 0.04, 1e-4, 1e-4],
         measurement=auvest.RangeBearing(near_field=near_field),
     )
-    result = f.run(z, 0.5)
+    result = f.run(z, dt=0.5)
     require_recovery(f, result, truth, 0.12)
     if near_field:
         # The first measurement alone gives the position to 0.05 m.

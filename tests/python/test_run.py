@@ -68,8 +68,8 @@ def test_run_is_predict_and_update(kind, dtype):
 def test_run_with_the_filters_own_interval(law, dtype):
     z, _ = record()
     reference = straight(60) + 0.01
-    a, b = make(auvest.Aukf, dtype, interval=law), make(auvest.Aukf, dtype, interval=law)
-    result = a.run(z, reference)
+    a, b = make(auvest.Aukf, dtype, policy=law), make(auvest.Aukf, dtype, policy=law)
+    result = a.run(z, reference=reference)
     for k in range(len(z)):
         b.predict()
         b.update(z[k])
@@ -97,15 +97,15 @@ def test_covariances_may_be_left_out(kind):
 def test_a_record_may_be_split():
     z, dt = record()
     a, b = make(auvest.Ukf), make(auvest.Ukf)
-    whole = a.run(z, dt)
-    parts = [b.run(z[:23], dt[:23]), b.run(z[23:], dt[23:])]
+    whole = a.run(z, dt=dt)
+    parts = [b.run(z[:23], dt=dt[:23]), b.run(z[23:], dt=dt[23:])]
     assert same_bits(whole.P, np.concatenate([p.P for p in parts]))
     assert everything(a) == everything(b)
 
 
 def test_layout_and_type_of_the_input_do_not_matter():
     z = np.round(measure(straight(40)))  # integers
-    expected = make(auvest.Ukf).run(z, 0.5)
+    expected = make(auvest.Ukf).run(z, dt=0.5)
     stride = np.zeros((80, 4))
     stride[::2, ::2] = z
     for given in (
@@ -117,16 +117,16 @@ def test_layout_and_type_of_the_input_do_not_matter():
         z.astype(">f8"),
         z.tolist(),
     ):
-        assert same_bits(make(auvest.Ukf).run(given, 0.5).x, expected.x)
-    assert same_bits(make(auvest.Ukf).run(z, np.full(40, 0.5)).x, expected.x)
-    assert same_bits(make(auvest.Ukf).run(z, np.float32(0.5)).x, expected.x)
+        assert same_bits(make(auvest.Ukf).run(given, dt=0.5).x, expected.x)
+    assert same_bits(make(auvest.Ukf).run(z, dt=np.full(40, 0.5)).x, expected.x)
+    assert same_bits(make(auvest.Ukf).run(z, dt=np.float32(0.5)).x, expected.x)
 
 
 def test_run_takes_another_station():
     other = auvest.RangeBearing(station=(5.0, 5.0))
     z = measure(straight(50), other.station)
     a, b = make(auvest.Ukf), make(auvest.Ukf, measurement=other)
-    assert same_bits(a.run(z, 0.5, other).x, b.run(z, 0.5).x)
+    assert same_bits(a.run(z, dt=0.5, measurement=other).x, b.run(z, dt=0.5).x)
 
 
 @pytest.mark.parametrize("kind", FILTERS)
@@ -149,7 +149,7 @@ def test_a_first_row_that_cannot_be_done():
     f = make(auvest.Ukf, "float32")
     before = everything(f)
     with pytest.raises(auvest.FilterError, match="run at row 0") as caught:
-        f.run([[1e30, 0.0]], 0.5)
+        f.run([[1e30, 0.0]], dt=0.5)
     assert caught.value.partial.x.shape == (0, 6)
     assert everything(f) == before
 
@@ -213,7 +213,7 @@ def test_a_million_steps_through_the_station(alpha):
         t = 0.5 * np.arange(first + 1, first + chunk + 1)
         figure = [5 * np.sin(2 * np.pi * t / 120), 4 * np.sin(2 * np.pi * t / 80)]
         truth = STATION + np.stack(figure, axis=1)
-        result = f.run(measure(truth, seed=first), 0.5)
+        result = f.run(measure(truth, seed=first), dt=0.5)
         assert np.isfinite(result.x).all()
         p = result.P.astype(np.float64)
         assert (p == np.swapaxes(p, 1, 2)).all()
@@ -248,7 +248,7 @@ def test_run_releases_the_gil():
         for _ in range(3):  # a busy machine may keep the other thread waiting for once
             ticks.clear()
             start = time.perf_counter()
-            f.run(z, 1e-3)
+            f.run(z, dt=1e-3)
             end = time.perf_counter()
             seen = np.array([start, *(t for t in ticks if start < t < end), end])
             longest.append(np.diff(seen).max() / (end - start))
@@ -263,7 +263,7 @@ def test_threads_with_a_filter_each_agree():
     z, dt = record()
 
     def job(_):
-        return make(auvest.Ukf, "float32").run(np.tile(z, (50, 1)), np.tile(dt, 50))
+        return make(auvest.Ukf, "float32").run(np.tile(z, (50, 1)), dt=np.tile(dt, 50))
 
     with ThreadPoolExecutor(4) as pool:
         results = list(pool.map(job, range(8)))
@@ -274,7 +274,7 @@ def test_threads_with_a_filter_each_agree():
 def test_a_filter_in_use_refuses_a_second_thread():
     f = make(auvest.Ukf, "float32")
     z = measure(straight(500_000, velocity=(1e-4, 1e-4)))
-    expected = make(auvest.Ukf, "float32").run(z, 1e-3)
+    expected = make(auvest.Ukf, "float32").run(z, dt=1e-3)
     refused = 0
     with ThreadPoolExecutor(1) as pool:
         future = pool.submit(f.run, z, 1e-3)

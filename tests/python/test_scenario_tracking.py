@@ -64,7 +64,7 @@ def test_a_simulated_run_is_the_filter_on_its_record():
     result = simulate(f, Scenario(runs=4, steps=40, noise=Noise(dropout=0.1)))
     for r in range(4):
         twin = aukf(dtype="float32")
-        run = twin.run(result.z[r], result.truth[r])
+        run = twin.run(result.z[r], reference=result.truth[r])
         assert same_bits(run.x.astype(np.float64), result.x[r])
         assert same_bits(run.interval_s.astype(np.float64), result.interval_s[r])
         assert same_bits(run.nis.astype(np.float64), result.nis[r])
@@ -198,7 +198,7 @@ def test_a_vehicle_that_wanders_leaves_the_truth_and_moves_the_reference():
     sensor = auvest.RangeBearing(sigma_range_m=1e-6, sigma_bearing_rad=1e-6)
     policy = auvest.MahalanobisInterval(scale=0.0, ratio_max=1.0, gamma1_m2=1e-12, max_s=10.0)
     # A small P0: the transform shifts the range by sigma^2 / (2 r).
-    f = auvest.Aukf([3.0, 4.0, 0.1, -0.2, 0, 0], 1e-4 * P0, measurement=sensor, interval=policy)
+    f = auvest.Aukf([3.0, 4.0, 0.1, -0.2, 0, 0], 1e-4 * P0, measurement=sensor, policy=policy)
     track = Track(
         kind="straight",
         position=(3.0, 4.0),
@@ -231,7 +231,7 @@ def test_the_preset_of_figure_3_does_what_figure_3_shows():
 
 def test_the_preset_of_table_1_collapses():
     law = auvest.MahalanobisInterval("table1")
-    interval = simulate(aukf(interval=law), Scenario(runs=50)).interval_s
+    interval = simulate(aukf(policy=law), Scenario(runs=50)).interval_s
     assert interval[:, 3:].max() <= max(0.018, law.min_s)
 
 

@@ -22,7 +22,7 @@ Z = measure(straight(40))
 
 
 def build(kind, law, dtype):
-    options = {} if law is None else {"interval": law}
+    options = {} if law is None else {"policy": law}
     if kind is not auvest.Ekf:
         options["alpha"] = 1e-3
     return make(
@@ -108,7 +108,7 @@ def test_the_near_field_flag_is_part_of_the_state(dtype):
 def test_status_survives_a_pickle_and_an_error_does_too():
     f = make(auvest.Ukf, "float32")
     with pytest.raises(auvest.FilterError) as caught:
-        f.run([[4.0, -0.8], [1e30, 0.0]], 0.5)
+        f.run([[4.0, -0.8], [1e30, 0.0]], dt=0.5)
     assert pickle.loads(pickle.dumps(f)).status == auvest.Status.overflow
     error = pickle.loads(pickle.dumps(caught.value))
     assert str(error) == str(caught.value)

@@ -222,7 +222,7 @@ def command(
             filter_name,
             noise=world,
             track=track,
-            interval=policy,
+            policy=policy,
             alpha=alpha,
             beta=beta,
             kappa=kappa,

@@ -157,7 +157,7 @@ def measure(
         noise: Noise,
         name: str = "aukf",
         *,
-        interval: IntervalPolicy | None = None,
+        policy: IntervalPolicy | None = None,
         steps: int = STEPS,
         p0_sigma: tuple[float, float, float] = P0_SIGMA,
         count: int = runs,
@@ -166,7 +166,7 @@ def measure(
         filter_ = paper_filter(
             name,  # type: ignore[arg-type]
             noise=noise,
-            interval=interval,
+            policy=policy,
             p0_sigma=p0_sigma,
             dtype=dtype,  # type: ignore[arg-type]
         )
@@ -191,7 +191,7 @@ def measure(
             noise=noise,
             ukf=fly(noise, "ukf"),
             aukf=aukf,
-            equal_rate=fly(noise, interval=FixedInterval(interval_s=mean)),
+            equal_rate=fly(noise, policy=FixedInterval(interval_s=mean)),
             same_time=fly(noise, "ukf", steps=steps),
             ekf=fly(noise, "ekf"),
         )
@@ -203,13 +203,13 @@ def measure(
         kind: compare(paper_noise(kind, centred=True)) for kind in NOISE_KINDS if kind != "normal"
     }
     normal = paper_noise("normal")
-    table1 = fly(normal, interval=MahalanobisInterval("table1"))
+    table1 = fly(normal, policy=MahalanobisInterval("table1"))
     tick()
-    table1_loud = fly(paper_noise("normal", range_m=1.0), interval=MahalanobisInterval("table1"))
+    table1_loud = fly(paper_noise("normal", range_m=1.0), policy=MahalanobisInterval("table1"))
     tick()
     tau0 = {}
     for value in TAU0_STUDIED:
-        tau0[value] = fly(normal, interval=MahalanobisInterval(tau0=value))
+        tau0[value] = fly(normal, policy=MahalanobisInterval(tau0=value))
         tick()
 
     loud = []
@@ -224,8 +224,8 @@ def measure(
     starts = []
     for initial_s, min_s in START_INTERVALS:
         law = MahalanobisInterval(initial_s=initial_s, min_s=min_s)
-        quiet = intervals(fly(paper_noise(range_m=1e-6, bearing_rad=1e-6), interval=law))
-        noisy = intervals(fly(normal, interval=law))
+        quiet = intervals(fly(paper_noise(range_m=1e-6, bearing_rad=1e-6), policy=law))
+        noisy = intervals(fly(normal, policy=law))
         starts.append(
             Start(
                 initial_s,

@@ -105,7 +105,7 @@ def paper_filter(
     *,
     noise: Noise,
     track: TrackName = "paper",
-    interval: IntervalPolicy | None = None,
+    policy: IntervalPolicy | None = None,
     alpha: float = ALPHA,
     beta: float = BETA,
     kappa: float = KAPPA,
@@ -117,13 +117,13 @@ def paper_filter(
     Parameters
     ----------
     name : {"ekf", "ukf", "aukf"}
-        The AUKF takes ``interval``, by default the paper's law with the preset ``figure3``.
+        The AUKF takes ``policy``, by default the paper's law with the preset ``figure3``.
     noise : Noise
         What it will meet: the standard deviations of the measurement model are those of the noise.
     track : {"paper", "straight", "turn"}
         Eq. (4) for "paper", the exact discretisation for the others.
-    interval : FixedInterval, MahalanobisInterval or CovarianceBudget, optional
-        Policy of the AUKF.
+    policy : FixedInterval, MahalanobisInterval or CovarianceBudget, optional
+        Interval policy of the AUKF.
     alpha, beta, kappa : float
         Sigma points of UKF and AUKF; Table 1 by default.
     p0_sigma : (float, float, float)
@@ -146,7 +146,7 @@ def paper_filter(
         P0,
         process=process,
         measurement=measurement,
-        interval=MahalanobisInterval() if interval is None else interval,
+        policy=MahalanobisInterval() if policy is None else policy,
         dtype=dtype,
         **points,
     )

@@ -24,48 +24,47 @@ Matrix<Scalar, N, M> random_matrix(auvest::math::Random& random, double scale) {
   return a;
 }
 
-/// Against x + K r, P - K S K' and r' S^-1 r, for H that sees the first O of N states. (The
-/// textbook in matrices of any size: they are compiled once.)
+/// Against x + K r, P - K S K' and r' S^-1 r, for H that sees the first O of N states.
 template <int N, int M, int O>
 void check_against_textbook() {
-  using Eigen::MatrixXd;
   auvest::math::Random random(N * 100 + M * 10 + O);
   for (int trial = 0; trial < 50; ++trial) {
-    const MatrixXd root = random_matrix<double, N, N>(random, 1);
-    const MatrixXd p = root * root.transpose() + 0.1 * MatrixXd::Identity(N, N);
-    const MatrixXd noise_root = random_matrix<double, M, M>(random, 0.3);
-    const MatrixXd noise = noise_root * noise_root.transpose() + 0.01 * MatrixXd::Identity(M, M);
-    MatrixXd h = MatrixXd::Zero(M, N);
-    h.leftCols(O) = random_matrix<double, M, O>(random, 1);
+    const Matrix<double, N, N> root = random_matrix<double, N, N>(random, 1);
+    const Matrix<double, N, N> p = root * root.transpose() + 0.1 * Matrix<double, N, N>::Identity();
+    const Matrix<double, M, M> noise_root = random_matrix<double, M, M>(random, 0.3);
+    const Matrix<double, M, M> noise =
+        noise_root * noise_root.transpose() + 0.01 * Matrix<double, M, M>::Identity();
+    const Matrix<double, M, O> h = random_matrix<double, M, O>(random, 1);
+    Matrix<double, M, N> full = Matrix<double, M, N>::Zero();
+    full.template leftCols<O>() = h;
 
     Belief<double, N> belief;
     belief.x = random_matrix<double, N, 1>(random, 1);
     belief.P = p;
-    const MatrixXd x = belief.x;
+    const Vector<double, N> x = belief.x;
     Correction<double, M> correction(Status::kOk);
     correction.innovation = random_matrix<double, M, 1>(random, 1);
 
-    Matrix<double, O, O> l;
+    Matrix<double, O, O> l = Matrix<double, O, O>::Zero();
     Matrix<double, auvest::math::other_states(N, O), O> slope;
-    REQUIRE(auvest::math::factor_leading(belief.P, l, slope));
-    Matrix<double, M, O> a = h.leftCols(O) * MatrixXd(l);
+    REQUIRE(auvest::math::factor_leading(p, l, slope));
+    Matrix<double, M, O> a = h * l;
     Matrix<double, M, M> used_noise = noise;
     REQUIRE(auvest::square_root_update(belief, l, slope, a, used_noise, correction) == Status::kOk);
 
-    const MatrixXd s = h * p * h.transpose() + noise;
-    const MatrixXd inverse = s.inverse();
-    const MatrixXd gain = p * h.transpose() * inverse;
-    const MatrixXd innovation = correction.innovation;
-    const MatrixXd expected_x = x + gain * innovation;
-    const MatrixXd expected_p = p - gain * s * gain.transpose();
+    const Matrix<double, M, M> s = full * p * full.transpose() + noise;
+    const Matrix<double, N, M> gain = p * full.transpose() * s.inverse();
+    const Vector<double, N> expected_x = x + gain * correction.innovation;
+    const Matrix<double, N, N> expected_p = p - gain * s * gain.transpose();
     for (int i = 0; i < N; ++i) {
       CHECK(std::fabs(belief.x(i) - expected_x(i)) < 1e-11);
       for (int j = 0; j <= i; ++j) {
         CHECK(std::fabs(belief.P(i, j) - expected_p(i, j)) < 1e-12 * p.trace());
       }
     }
-    CHECK((MatrixXd(correction.S) - s).cwiseAbs().maxCoeff() < 1e-12 * s.trace());
-    CHECK(correction.nis == close_to((innovation.transpose() * inverse * innovation)(0, 0), 1e-9));
+    CHECK((correction.S - s).cwiseAbs().maxCoeff() < 1e-12 * s.trace());
+    CHECK(correction.nis ==
+          close_to(correction.innovation.dot(s.inverse() * correction.innovation), 1e-9));
   }
 }
 
@@ -83,8 +82,8 @@ TEST_CASE("square-root update: float stays positive where P - K S K' does not") 
   Belief<float, 2> belief;
   belief.x.setZero();
   belief.P << 1e6f, 0, 9.9e5f, 1e6f;
-  Matrix<float, 2, 2> root;
-  Matrix<float, 1, 2> none;
+  Matrix<float, 2, 2> root = Matrix<float, 2, 2>::Zero();
+  Matrix<float, 1, 2> none = Matrix<float, 1, 2>::Zero();
   REQUIRE(auvest::math::factor_leading(belief.P, root, none));
   Matrix<float, 1, 2> a;
   a << root(0, 0), 0;  // H = (1, 0)
@@ -110,8 +109,8 @@ TEST_CASE("square-root update: after an outage, float keeps what the fix says of
   Belief<float, 2> belief;
   belief.x.setZero();
   belief.P << float(variance * time * time + 0.01), 0, float(variance * time), float(variance);
-  Matrix<float, 1, 1> root;
-  Matrix<float, 1, 1> slope;
+  Matrix<float, 1, 1> root = Matrix<float, 1, 1>::Zero();
+  Matrix<float, 1, 1> slope = Matrix<float, 1, 1>::Zero();
   REQUIRE(auvest::math::factor_leading(belief.P, root, slope));
   Matrix<float, 1, 1> a;
   a << root(0, 0);
@@ -135,8 +134,8 @@ TEST_CASE("square-root update: what would overflow is refused and changes nothin
     Belief<float, 2> belief;
     belief.x << 3e38f, 1;
     belief.P << 1e4f, 0, 1, 1e4f;
-    Matrix<float, 1, 1> root;
-    Matrix<float, 1, 1> slope;
+    Matrix<float, 1, 1> root = Matrix<float, 1, 1>::Zero();
+    Matrix<float, 1, 1> slope = Matrix<float, 1, 1>::Zero();
     REQUIRE(auvest::math::factor_leading(belief.P, root, slope));
     Matrix<float, 1, 1> a;
     a << root(0, 0);
