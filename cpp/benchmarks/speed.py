@@ -16,6 +16,7 @@ import math
 import re
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -233,9 +234,10 @@ def numba_estimates(z: np.ndarray) -> np.ndarray:
 
 def instructions(program: Path, scalar: str, steps: int = 1000) -> float:
     """Return the instructions of one step, counted by callgrind."""
-    command = ["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null"]
-    command += [f"--toggle-collect=ukf_step_{scalar}", str(program), str(steps)]
-    run = subprocess.run(command, capture_output=True, text=True, check=True)
+    command = ["valgrind", "--tool=callgrind", f"--toggle-collect=ukf_step_{scalar}"]
+    with tempfile.TemporaryDirectory() as folder:  # for callgrind's own file
+        command += [f"--callgrind-out-file={folder}/out", str(program), str(steps)]
+        run = subprocess.run(command, capture_output=True, text=True, check=True)
     found = re.search(r"Collected : (\d+)", run.stderr)
     if not found or int(found[1]) == 0:
         raise RuntimeError(f"callgrind collected nothing:\n{run.stderr}")
