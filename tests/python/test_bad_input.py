@@ -400,8 +400,8 @@ def test_filters_without_an_interval_of_their_own_need_dt(kind):
     with pytest.raises(TypeError, match="dt must be a number"):
         f.predict(None)
     with pytest.raises(TypeError, match="dt must be a number or an array"):
-        f.run(Z, None)
-    with pytest.raises(TypeError, match="missing 1 required positional argument: 'dt'"):
+        f.run(Z, dt=None)
+    with pytest.raises(TypeError, match="missing 1 required keyword-only argument: 'dt'"):
         f.run(Z)
     assert everything(f) == before
 

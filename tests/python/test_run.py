@@ -185,7 +185,7 @@ def test_float32_follows_float64(alpha, discretisation):
     p0 = np.diag([100.0, 100.0, 10.0, 10.0, 1.0, 1.0])
     single, double = (
         auvest.Ukf(x0, p0, process=process, measurement=sensor, alpha=alpha, dtype=dtype).run(
-            z, 0.5
+            z, dt=0.5
         )
         for dtype in ("float32", "float64")
     )
@@ -277,7 +277,7 @@ def test_a_filter_in_use_refuses_a_second_thread():
     expected = make(auvest.Ukf, "float32").run(z, dt=1e-3)
     refused = 0
     with ThreadPoolExecutor(1) as pool:
-        future = pool.submit(f.run, z, 1e-3)
+        future = pool.submit(f.run, z, dt=1e-3)
         while not future.done():
             time.sleep(0.002)
             try:
