@@ -110,12 +110,14 @@ test-firmware: install-editable ## the library, the sketches on the simulated bo
 test-cpp: build-release ## the C++ tests, optimised, with the examples
 	ctest --test-dir build/release
 
-# gcc and clang, each standard, all under the address and undefined-behaviour sanitizers.
-MATRIX := $(foreach compiler,gcc clang,$(foreach std,11 14 17 20,matrix-$(compiler)-$(std)))
+# Each standard with gcc or clang, all under the address and undefined-behaviour sanitizers. (Any pair
+# has a target; all eight would double the time.)
+MATRIX := matrix-gcc-11 matrix-clang-14 matrix-clang-17 matrix-gcc-20
+PAIRS := $(foreach compiler,gcc clang,$(foreach std,11 14 17 20,matrix-$(compiler)-$(std)))
 test-cpp-matrix: $(MATRIX) ## the C++ tests: gcc and clang, C++11 to 20, under sanitizers
 
-.PHONY: $(MATRIX) build-release
-$(MATRIX): matrix-%: setup-dev
+.PHONY: $(PAIRS) build-release
+$(PAIRS): matrix-%: setup-dev
 	cmake -S . -B build/$@ -G Ninja --log-level=WARNING -D AUVEST_BUILD_TESTS=ON \
 	    -D AUVEST_SANITIZE=ON -D CMAKE_BUILD_TYPE=Debug -D CMAKE_CXX_FLAGS_DEBUG='-O1 -g1' \
 	    -D CMAKE_CXX_COMPILER=$(if $(findstring clang,$@),clang++,g++) \
