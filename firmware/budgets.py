@@ -252,15 +252,8 @@ def _run_filter(compiled: Compiled, folder: Path) -> Row:
     step = report.sections[1]
     if step.count != STEPS[folder.name]:
         raise BudgetError(f"{folder.name}: {step.count} steps instead of {STEPS[folder.name]}")
-    row = _row(folder.name, compiled, report.stack_bytes, [])
-    return Row(
-        **{
-            **vars(row),
-            "cycles_min": step.minimum,
-            "cycles_median": step.median,
-            "cycles_max": step.maximum,
-        }
-    )
+    cycles = [step.minimum, step.median, step.maximum]
+    return _row(folder.name, compiled, report.stack_bytes, cycles)
 
 
 def _run_first_steps(compiled: Compiled, folder: Path) -> Row:
