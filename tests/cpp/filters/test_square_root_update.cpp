@@ -45,13 +45,16 @@ void check_against_textbook() {
     Correction<double, M> correction(Status::kOk);
     correction.innovation = random_matrix<double, M, 1>(random, 1);
 
-    Matrix<double, O, O> l = Matrix<double, O, O>::Zero();
+    Matrix<double, O, O> l;
     Matrix<double, auvest::math::other_states(N, O), O> slope;
-    REQUIRE(auvest::math::factor_leading(p, l, slope));
+    const bool positive = auvest::math::factor_leading(p, l, slope);
+    REQUIRE(positive);
     Matrix<double, M, O> a = h * l;
     Matrix<double, M, M> used_noise = noise;
     REQUIRE(auvest::square_root_update(belief, l, slope, a, used_noise, correction) == Status::kOk);
 
+    // L becomes a root of P_oo+.
+    const Matrix<double, O, O> after = l * l.transpose();
     const Matrix<double, M, M> s = full * p * full.transpose() + noise;
     const Matrix<double, N, M> gain = p * full.transpose() * s.inverse();
     const Vector<double, N> expected_x = x + gain * correction.innovation;
@@ -62,6 +65,12 @@ void check_against_textbook() {
         CHECK(std::fabs(belief.P(i, j) - expected_p(i, j)) < 1e-12 * p.trace());
       }
     }
+    for (int i = 0; i < O; ++i) {
+      for (int j = 0; j <= i; ++j) {
+        CHECK(std::fabs(after(i, j) - expected_p(i, j)) < 1e-12 * p.trace());
+      }
+    }
+    CHECK(used_noise.diagonal().prod() == close_to(s.determinant(), 1e-9));  // as potter() says
     CHECK((correction.S - s).cwiseAbs().maxCoeff() < 1e-12 * s.trace());
     CHECK(correction.nis ==
           close_to(correction.innovation.dot(s.inverse() * correction.innovation), 1e-9));
@@ -82,9 +91,10 @@ TEST_CASE("square-root update: float stays positive where P - K S K' does not") 
   Belief<float, 2> belief;
   belief.x.setZero();
   belief.P << 1e6f, 0, 9.9e5f, 1e6f;
-  Matrix<float, 2, 2> root = Matrix<float, 2, 2>::Zero();
-  Matrix<float, 1, 2> none = Matrix<float, 1, 2>::Zero();
-  REQUIRE(auvest::math::factor_leading(belief.P, root, none));
+  Matrix<float, 2, 2> root;
+  Matrix<float, 1, 2> none;
+  const bool positive = auvest::math::factor_leading(belief.P, root, none);
+  REQUIRE(positive);
   Matrix<float, 1, 2> a;
   a << root(0, 0), 0;  // H = (1, 0)
   Matrix<float, 1, 1> noise;
@@ -109,9 +119,10 @@ TEST_CASE("square-root update: after an outage, float keeps what the fix says of
   Belief<float, 2> belief;
   belief.x.setZero();
   belief.P << float(variance * time * time + 0.01), 0, float(variance * time), float(variance);
-  Matrix<float, 1, 1> root = Matrix<float, 1, 1>::Zero();
-  Matrix<float, 1, 1> slope = Matrix<float, 1, 1>::Zero();
-  REQUIRE(auvest::math::factor_leading(belief.P, root, slope));
+  Matrix<float, 1, 1> root;
+  Matrix<float, 1, 1> slope;
+  const bool positive = auvest::math::factor_leading(belief.P, root, slope);
+  REQUIRE(positive);
   Matrix<float, 1, 1> a;
   a << root(0, 0);
   Matrix<float, 1, 1> noise;
@@ -134,9 +145,10 @@ TEST_CASE("square-root update: what would overflow is refused and changes nothin
     Belief<float, 2> belief;
     belief.x << 3e38f, 1;
     belief.P << 1e4f, 0, 1, 1e4f;
-    Matrix<float, 1, 1> root = Matrix<float, 1, 1>::Zero();
-    Matrix<float, 1, 1> slope = Matrix<float, 1, 1>::Zero();
-    REQUIRE(auvest::math::factor_leading(belief.P, root, slope));
+    Matrix<float, 1, 1> root;
+    Matrix<float, 1, 1> slope;
+    const bool positive = auvest::math::factor_leading(belief.P, root, slope);
+    REQUIRE(positive);
     Matrix<float, 1, 1> a;
     a << root(0, 0);
     Matrix<float, 1, 1> noise;
@@ -168,7 +180,7 @@ TEST_CASE("square-root update: an indefinite noise is refused") {
   Belief<double, 2> pair;
   pair.x.setZero();
   pair.P.setIdentity();
-  const Matrix<double, 2, 2> root = pair.P;
+  Matrix<double, 2, 2> root = pair.P;
   const Matrix<double, 1, 2> none = Matrix<double, 1, 2>::Zero();
   Matrix<double, 2, 2> indefinite;
   indefinite << 1, 2, 2, 1;

@@ -3,6 +3,7 @@
 #include "close.hpp"
 
 #include <Eigen/Cholesky>
+#include <type_traits>
 
 #include "auvest/math/linear_algebra.hpp"
 #include "auvest/math/random.hpp"
@@ -28,7 +29,8 @@ template <int O, class Scalar, int N>
 double factor_error(const Matrix<Scalar, N, N>& p) {
   Matrix<Scalar, O, O> root;
   Matrix<Scalar, auvest::math::other_states(N, O), O> slope;
-  REQUIRE(auvest::math::factor_leading(p, root, slope));
+  const bool positive = auvest::math::factor_leading(p, root, slope);
+  REQUIRE(positive);
   double worst = 0;
   for (int i = 0; i < N; ++i) {
     for (int j = 0; j < O; ++j) {
@@ -62,7 +64,8 @@ TEST_CASE("factor of the leading block: the full root is Eigen's") {
   const auto p = random_covariance<double, 6>(random);
   Matrix<double, 6, 6> root;
   Matrix<double, 1, 6> none;
-  REQUIRE(auvest::math::factor_leading(p, root, none));
+  const bool positive = auvest::math::factor_leading(p, root, none);
+  REQUIRE(positive);
   const Eigen::Matrix<double, 6, 6> expected = Eigen::Matrix<double, 6, 6>(p).llt().matrixL();
   for (int i = 0; i < 6; ++i) {
     for (int j = 0; j <= i; ++j) CHECK(root(i, j) == close_to(expected(i, j), 1e-13));
@@ -74,7 +77,8 @@ TEST_CASE("factor of the leading block: a lost pivot is floored, a bad diagonal 
   p << 1, 1, 1, 1;  // singular: the second pivot is 0
   Matrix<float, 2, 2> root;
   Matrix<float, 1, 2> none;
-  REQUIRE(auvest::math::factor_leading(p, root, none));
+  const bool positive = auvest::math::factor_leading(p, root, none);
+  REQUIRE(positive);
   CHECK(root(1, 1) ==
         close_to(std::sqrt(4.0 * double(std::numeric_limits<float>::epsilon())), 1e-7));
   for (const float bad : {0.0f, -1.0f, std::nanf("")}) {
@@ -142,6 +146,34 @@ TEST_CASE("symmetric product: against Eigen") {
   const auto result = auvest::math::symmetric_product(phi, lower);
   const Matrix<double, 4, 4> expected = phi * p * phi.transpose();
   CHECK((result - expected).cwiseAbs().maxCoeff() < 1e-12 * expected.trace());
+}
+
+TEST_CASE_TEMPLATE("dropped pivots: L L' gives P back, and no more rank", Scalar, float, double) {
+  auvest::math::Random random(21);
+  const double tolerance = std::is_same<Scalar, float>::value ? 2e-6 : 4e-15;
+  for (int trial = 0; trial < 200; ++trial) {
+    // Rank 0 to 3: sums of outer products.
+    const int rank = trial % 4;
+    Matrix<Scalar, 3, 3> p = Matrix<Scalar, 3, 3>::Zero();
+    for (int r = 0; r < rank; ++r) {
+      Vector<Scalar, 3> v;
+      for (int i = 0; i < 3; ++i) v(i) = random.normal<Scalar>();
+      if (trial % 8 < 4) v(0) = Scalar(0);  // a leading zero pivot
+      p += v * v.transpose();
+    }
+    Matrix<Scalar, 3, 3> l;
+    Matrix<Scalar, 1, 3> none;
+    auvest::math::factor_leading<auvest::math::DropLostPivots>(p, l, none);
+    for (int i = 0; i < 3; ++i) {
+      CHECK(l(i, i) >= Scalar(0));
+      for (int j = 0; j <= i; ++j) {
+        double sum = 0;
+        for (int k = 0; k <= j; ++k) sum += double(l(i, k)) * double(l(j, k));
+        CHECK(std::fabs(sum - double(p(i, j))) <= tolerance * double(p.trace()));
+        if (double(l(j, j)) <= 0) CHECK(double(l(i, j)) == 0);  // a lost pivot: no column
+      }
+    }
+  }
 }
 
 }  // namespace

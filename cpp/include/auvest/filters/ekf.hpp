@@ -29,13 +29,7 @@ class Ekf : public GaussianFilter<Ekf<Process>, Process> {
                    Matrix<Scalar, Model::kSize, Model::kObserved>& a,
                    typename Model::Noise& noise) const {
     innovation = model.residual(z, point.value());
-    const typename Model::Jacobian h = point.H();
-    for (int m = 0; m < Model::kSize; ++m) {  // A = H L
-      for (int k = 0; k < Model::kObserved; ++k) {
-        a(m, k) = h(m, k) * root(k, k);
-        for (int i = k + 1; i < Model::kObserved; ++i) a(m, k) = a(m, k) + h(m, i) * root(i, k);
-      }
-    }
+    project(point.H(), root, a);
     noise = model.R();
     return Status::kOk;
   }

@@ -20,6 +20,10 @@
 //     P_uo+ = B P_oo+,   P_uu+ = P_uu - (P_uo - P_uo+) B',   x_u+ = x_u + B (x_o+ - x_o).
 //
 // The NIS comes out as a sum of squares, sum r^2 / s, which equals innovation' S^-1 innovation.
+//
+// A particle filter with one Gaussian per particle takes the same steps in the lanes of a vector
+// register: all but square_root_update() is written over `Value`, a number or a batch of numbers
+// (select.hpp), and answers with a mask.
 #pragma once
 
 #include "auvest/math/linear_algebra.hpp"
@@ -50,93 +54,136 @@ struct Correction {
   }
 };
 
-namespace detail {
+/// What a measurement makes of the coordinates y ~ N(0, I).
+template <class Value, int O>
+struct Posterior {
+  Vector<Value, O> y;     ///< their mean
+  Matrix<Value, O, O> g;  ///< G', with G G' their covariance
+  Value nis;
+};
 
-/// The posterior N(y, G G') of the coordinates, from the prior N(0, I): Potter's formula, one
-/// decorrelated measurement after the other. Uses up `a` and `noise`; `g` is G'.
-template <int M, int O, class Scalar>
-AUVEST_OUTLINE AUVEST_INLINE Status potter(Matrix<Scalar, M, O>& a, Matrix<Scalar, M, M>& noise,
-                                           Correction<Scalar, M>& correction, Vector<Scalar, O>& y,
-                                           Matrix<Scalar, O, O>& g) {
+/// A = H L.
+template <class Value, int M, int O>
+AUVEST_INLINE void project(const Matrix<Value, M, O>& h, const Matrix<Value, O, O>& root,
+                           Matrix<Value, M, O>& a) {
+  AUVEST_UNROLL
+  for (int m = 0; m < M; ++m) {
+    AUVEST_UNROLL
+    for (int k = 0; k < O; ++k) {
+      Value sum = h(m, k) * root(k, k);
+      AUVEST_UNROLL
+      for (int i = k + 1; i < O; ++i) sum = sum + h(m, i) * root(i, k);
+      a(m, k) = sum;
+    }
+  }
+}
+
+/// S = A A' + E, from the lower triangle of E; both triangles.
+template <class Value, int M, int O>
+AUVEST_INLINE void innovation_covariance(const Matrix<Value, M, O>& a,
+                                         const Matrix<Value, M, M>& noise, Matrix<Value, M, M>& s) {
+  AUVEST_UNROLL
+  for (int i = 0; i < M; ++i) {
+    AUVEST_UNROLL
+    for (int j = 0; j <= i; ++j) {
+      s(i, j) = math::plus_dot(noise(i, j), &a(i, 0), &a(j, 0), O);
+      s(j, i) = s(i, j);
+    }
+  }
+}
+
+/// Potter's formula, one decorrelated measurement after the other. `noise` is E = U D U' as
+/// math::ldlt leaves it. Uses up `a`; leaves the variances s on the diagonal of `noise`, whose
+/// product is the determinant of S. False where the result would not be finite.
+template <class Value, int M, int O>
+AUVEST_OUTLINE AUVEST_INLINE math::Mask<Value> potter(Matrix<Value, M, O>& a,
+                                                      Matrix<Value, M, M>& noise,
+                                                      const Vector<Value, M>& innovation,
+                                                      Posterior<Value, O>& posterior) {
   using math::dot;
+  using math::is_finite;
   using math::minus_dot;
   using math::plus_dot;
   using math::sqrt;
-  if (!math::ldlt(noise)) return Status::kNotPositiveDefinite;
-  Vector<Scalar, M> residual;  // the innovation decorrelated
-  correction.nis = Scalar(0);
+  Vector<Value, O>& y = posterior.y;
+  Matrix<Value, O, O>& g = posterior.g;
+  Vector<Value, M> residual;  // the innovation decorrelated
+  posterior.nis = Value(0);
+  math::Mask<Value> finite = is_finite(noise(0, 0));
   AUVEST_UNROLL
   for (int m = 0; m < M; ++m) {
-    residual(m) = minus_dot(correction.innovation(m), &noise(m, 0), residual.data(), m);
+    residual(m) = minus_dot(innovation(m), &noise(m, 0), residual.data(), m);
     AUVEST_UNROLL
     for (int l = 0; l < m; ++l) {
       AUVEST_UNROLL
       for (int k = 0; k < O; ++k) a(m, k) = a(m, k) - noise(m, l) * a(l, k);
     }
     const bool first = m == 0;  // y = 0 and G = I
-    Vector<Scalar, O> f;        // G' a
+    Vector<Value, O> f;         // G' a
     AUVEST_UNROLL
     for (int k = 0; k < O; ++k) f(k) = first ? a(m, k) : dot(&g(k, 0), &a(m, 0), O);
-    const Scalar spread = plus_dot(noise(m, m), f.data(), f.data(), O);
-    const Scalar gamma = Scalar(1) / (spread + sqrt(noise(m, m) * spread));
+    const Value spread = plus_dot(noise(m, m), f.data(), f.data(), O);
+    const Value gamma = Value(1) / (spread + sqrt(noise(m, m) * spread));
     // f and with it all that follows from it is bounded by these two.
-    if (!math::is_finite(spread) || !math::is_finite(gamma)) return Status::kOverflow;
-    const Scalar surprise = first ? residual(m) : minus_dot(residual(m), &a(m, 0), y.data(), O);
-    const Scalar step = surprise / spread;
-    correction.nis = correction.nis + step * surprise;
+    finite = finite && is_finite(spread) && is_finite(gamma);
+    noise(m, m) = spread;
+    const Value surprise = first ? residual(m) : minus_dot(residual(m), &a(m, 0), y.data(), O);
+    const Value step = surprise / spread;
+    posterior.nis = posterior.nis + step * surprise;
     AUVEST_UNROLL
     for (int k = 0; k < O; ++k) {
-      Scalar v = f(k);  // G f
+      Value v = f(k);  // G f
       if (!first) {
         v = g(0, k) * f(0);
         AUVEST_UNROLL
         for (int l = 1; l < O; ++l) v = v + g(l, k) * f(l);
       }
       y(k) = first ? v * step : y(k) + v * step;
-      const Scalar scaled = v * gamma;
+      const Value scaled = v * gamma;
       AUVEST_UNROLL
       for (int l = 0; l < O; ++l) {
-        g(l, k) = (first ? Scalar(k == l) : g(l, k)) - scaled * f(l);
+        g(l, k) = (first ? Value(k == l ? 1 : 0) : g(l, k)) - scaled * f(l);
       }
     }
   }
-  return math::is_finite(correction.nis) ? Status::kOk : Status::kOverflow;
+  return finite && is_finite(posterior.nis);
 }
 
-/// Moves `belief` to the posterior N(y, G G') of its coordinates (`g` is G'). kOverflow if the
-/// state would not be finite; nothing has been touched then.
-template <int O, int U, class Scalar, int N>
-AUVEST_OUTLINE AUVEST_INLINE Status move_belief(Belief<Scalar, N>& belief,
-                                                const Matrix<Scalar, O, O>& root,
-                                                const Matrix<Scalar, U, O>& slope,
-                                                const Vector<Scalar, O>& y,
-                                                const Matrix<Scalar, O, O>& g) {
+/// Moves `belief` to the posterior of its coordinates; `root` becomes L G, a root of P_oo+. False
+/// where the state would not be finite: a number is then untouched, a lane of a batch is lost.
+template <int O, int U, class Value, int N>
+AUVEST_OUTLINE AUVEST_INLINE math::Mask<Value> move_belief(Belief<Value, N>& belief,
+                                                           Matrix<Value, O, O>& root,
+                                                           const Matrix<Value, U, O>& slope,
+                                                           const Posterior<Value, O>& posterior) {
+  using math::any;
   using math::dot;
-  Vector<Scalar, N> x;
-  Vector<Scalar, O> shift;  // L y
-  bool finite = true;
+  Vector<Value, N> x;
+  Vector<Value, O> shift;  // L y
   AUVEST_UNROLL
   for (int i = 0; i < N; ++i) {
     if (i < O) {
-      shift(i) = dot(&root(i, 0), y.data(), i + 1);
+      shift(i) = dot(&root(i, 0), posterior.y.data(), i + 1);
       x(i) = belief.x(i) + shift(i);
     } else {
       x(i) = math::plus_dot(belief.x(i), &slope(i - O, 0), shift.data(), O);
     }
-    finite = finite && math::is_finite(x(i));
   }
-  if (!finite) return Status::kOverflow;
+  const math::Mask<Value> finite = math::all_finite(x);
+  if (!any(finite)) return finite;
   math::copy(x, belief.x);
 
   // The observed states: P_oo = (L G)(L G)', in both triangles for what follows.
-  Matrix<Scalar, O, O> square;
   AUVEST_UNROLL
   for (int i = 0; i < O; ++i) {
+    Vector<Value, O> row;
     AUVEST_UNROLL
-    for (int k = 0; k < O; ++k) square(i, k) = dot(&root(i, 0), &g(k, 0), i + 1);
+    for (int k = 0; k < O; ++k) row(k) = dot(&root(i, 0), &posterior.g(k, 0), i + 1);
+    AUVEST_UNROLL
+    for (int k = 0; k < O; ++k) root(i, k) = row(k);
     AUVEST_UNROLL
     for (int j = 0; j <= i; ++j) {
-      belief.P(i, j) = dot(&square(i, 0), &square(j, 0), O);
+      belief.P(i, j) = dot(&root(i, 0), &root(j, 0), O);
       belief.P(j, i) = belief.P(i, j);
     }
   }
@@ -145,46 +192,38 @@ AUVEST_OUTLINE AUVEST_INLINE Status move_belief(Belief<Scalar, N>& belief,
   // what the format resolves.
   AUVEST_UNROLL
   for (int i = O; i < N; ++i) {
-    Vector<Scalar, O> change;  // row i of P_uo - P_uo+
+    Vector<Value, O> change;  // row i of P_uo - P_uo+
     AUVEST_UNROLL
     for (int k = 0; k < O; ++k) {
-      const Scalar after = dot(&slope(i - O, 0), &belief.P(k, 0), O);
+      const Value after = dot(&slope(i - O, 0), &belief.P(k, 0), O);
       change(k) = belief.P(i, k) - after;
       belief.P(i, k) = after;
     }
-    const Scalar floor = math::pivot_floor(belief.P(i, i));
+    const Value floor = math::pivot_floor(belief.P(i, i));
     AUVEST_UNROLL
     for (int j = O; j <= i; ++j) {
       belief.P(i, j) = math::minus_dot(belief.P(i, j), change.data(), &slope(j - O, 0), O);
     }
-    if (belief.P(i, i) < floor) belief.P(i, i) = floor;
+    belief.P(i, i) = math::larger(belief.P(i, i), floor);
   }
-  return Status::kOk;
+  return finite;
 }
 
-}  // namespace detail
-
 /// Updates `belief`. `root` is L and `slope` is B of math::factor_leading; `a` is A, and `noise` is
-/// E (lower triangle); both are used up. Fills S and nis from `correction.innovation`. Returns
-/// kNotPositiveDefinite if E is not positive definite, kOverflow if the result would not be finite,
-/// and has not touched the belief then.
+/// E (lower triangle); all but `slope` are used up. Fills S and nis from `correction.innovation`.
+/// Returns kNotPositiveDefinite if E is not positive definite, kOverflow if the result would not be
+/// finite, and has not touched the belief then.
 template <int M, int O, int U, class Scalar, int N>
-AUVEST_INLINE Status square_root_update(Belief<Scalar, N>& belief, const Matrix<Scalar, O, O>& root,
+AUVEST_INLINE Status square_root_update(Belief<Scalar, N>& belief, Matrix<Scalar, O, O>& root,
                                         const Matrix<Scalar, U, O>& slope, Matrix<Scalar, M, O>& a,
                                         Matrix<Scalar, M, M>& noise,
                                         Correction<Scalar, M>& correction) {
-  AUVEST_UNROLL
-  for (int i = 0; i < M; ++i) {
-    AUVEST_UNROLL
-    for (int j = 0; j <= i; ++j) {
-      correction.S(i, j) = math::plus_dot(noise(i, j), &a(i, 0), &a(j, 0), O);
-      correction.S(j, i) = correction.S(i, j);
-    }
-  }
-  Vector<Scalar, O> y;
-  Matrix<Scalar, O, O> g;
-  const Status status = detail::potter(a, noise, correction, y, g);
-  return status == Status::kOk ? detail::move_belief(belief, root, slope, y, g) : status;
+  innovation_covariance(a, noise, correction.S);
+  if (!math::ldlt(noise)) return Status::kNotPositiveDefinite;
+  Posterior<Scalar, O> posterior;
+  if (!potter(a, noise, correction.innovation, posterior)) return Status::kOverflow;
+  correction.nis = posterior.nis;
+  return move_belief(belief, root, slope, posterior) ? Status::kOk : Status::kOverflow;
 }
 
 }  // namespace auvest

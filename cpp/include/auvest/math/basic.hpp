@@ -11,6 +11,7 @@
 
 #include "auvest/config.hpp"
 #include "auvest/math/bits.hpp"
+#include "auvest/math/select.hpp"
 
 namespace auvest {
 namespace math {
@@ -31,9 +32,9 @@ constexpr Scalar two_pi() {
 }
 
 /// Distance from 1 to the next number.
-template <class Scalar>
-constexpr Scalar machine_epsilon() {
-  return std::numeric_limits<Scalar>::epsilon();
+template <class Value>
+constexpr Value machine_epsilon() {
+  return Value(std::numeric_limits<typename ScalarOf<Value>::Type>::epsilon());
 }
 
 /// The one NaN that float functions return (0x7fc00000). Targets differ in the NaN they make by

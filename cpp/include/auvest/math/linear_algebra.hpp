@@ -3,46 +3,50 @@
 //
 // Eigen gives the types; its products and decompositions are large on an 8-bit chip and leave the
 // order of a sum to the version and the vector unit. Symmetric matrices are read and written in
-// their lower triangle only.
+// their lower triangle only. What the particle filters use is written over `Value`, a number or a
+// batch of numbers (select.hpp); conditions are then masks.
 #pragma once
 
 #include <cstring>
 
 #include "auvest/math/basic.hpp"
+#include "auvest/math/select.hpp"
 #include "auvest/types.hpp"
 
 namespace auvest {
 namespace math {
 
 /// start + sum_i u[i] v[i], in the order of i.
-template <class Scalar>
-AUVEST_OUTLINE AUVEST_INLINE Scalar plus_dot(Scalar start, const Scalar* u, const Scalar* v,
-                                             int count) {
+template <class Value>
+AUVEST_OUTLINE AUVEST_INLINE Value plus_dot(Value start, const Value* u, const Value* v,
+                                            int count) {
   AUVEST_UNROLL
   for (int i = 0; i < count; ++i) start = start + u[i] * v[i];
   return start;
 }
 
 /// start - sum_i u[i] v[i], in the order of i.
-template <class Scalar>
-AUVEST_OUTLINE AUVEST_INLINE Scalar minus_dot(Scalar start, const Scalar* u, const Scalar* v,
-                                              int count) {
+template <class Value>
+AUVEST_OUTLINE AUVEST_INLINE Value minus_dot(Value start, const Value* u, const Value* v,
+                                             int count) {
   AUVEST_UNROLL
   for (int i = 0; i < count; ++i) start = start - u[i] * v[i];
   return start;
 }
 
 /// sum_i u[i] v[i], in the order of i, for count > 0.
-template <class Scalar>
-AUVEST_OUTLINE AUVEST_INLINE Scalar dot(const Scalar* u, const Scalar* v, int count) {
+template <class Value>
+AUVEST_OUTLINE AUVEST_INLINE Value dot(const Value* u, const Value* v, int count) {
   return plus_dot(u[0] * v[0], u + 1, v + 1, count - 1);
 }
 
 /// Fills a matrix with zeros.
-template <class Scalar, int Rows, int Cols>
-inline void set_zero(Matrix<Scalar, Rows, Cols>& a) {
+template <class Value, int Rows, int Cols>
+AUVEST_INLINE void set_zero(Matrix<Value, Rows, Cols>& a) {
+  AUVEST_UNROLL
   for (int i = 0; i < Rows; ++i) {
-    for (int j = 0; j < Cols; ++j) a(i, j) = Scalar(0);
+    AUVEST_UNROLL
+    for (int j = 0; j < Cols; ++j) a(i, j) = Value(0);
   }
 }
 
@@ -58,6 +62,28 @@ inline void copy(const Belief<Scalar, N>& from, Belief<Scalar, N>& to) {
   copy(from.P, to.P);
 }
 
+/// to = from in the lanes of `where`.
+template <class Value, int Rows, int Cols>
+AUVEST_INLINE void copy_where(const Mask<Value>& where, const Matrix<Value, Rows, Cols>& from,
+                              Matrix<Value, Rows, Cols>& to) {
+  AUVEST_UNROLL
+  for (int i = 0; i < Rows; ++i) {
+    AUVEST_UNROLL
+    for (int j = 0; j < Cols; ++j) to(i, j) = select(where, from(i, j), to(i, j));
+  }
+}
+
+template <class Value, int N>
+AUVEST_INLINE void copy_where(const Mask<Value>& where, const Belief<Value, N>& from,
+                              Belief<Value, N>& to) {
+  copy_where(where, from.x, to.x);
+  AUVEST_UNROLL
+  for (int i = 0; i < N; ++i) {
+    AUVEST_UNROLL
+    for (int j = 0; j <= i; ++j) to.P(i, j) = select(where, from.P(i, j), to.P(i, j));
+  }
+}
+
 /// Copies the lower triangle onto the upper one.
 template <class Scalar, int N>
 inline void mirror_lower(Matrix<Scalar, N, N>& a) {
@@ -71,9 +97,9 @@ inline void mirror_lower(Matrix<Scalar, N, N>& a) {
 constexpr int other_states(int n, int o) { return n > o ? n - o : 1; }
 
 /// True if every element is finite.
-template <class Scalar, int Rows, int Cols>
-AUVEST_INLINE bool all_finite(const Matrix<Scalar, Rows, Cols>& a) {
-  bool finite = true;
+template <class Value, int Rows, int Cols>
+AUVEST_INLINE Mask<Value> all_finite(const Matrix<Value, Rows, Cols>& a) {
+  Mask<Value> finite = is_finite(a(0, 0));
   AUVEST_UNROLL
   for (int i = 0; i < Rows; ++i) {
     AUVEST_UNROLL
@@ -101,97 +127,122 @@ AUVEST_INLINE bool all_finite(const Belief<Scalar, N>& belief) {
 }
 
 /// The least pivot that is more than rounding noise of an elimination: 4 epsilon of the diagonal.
-template <class Scalar>
-AUVEST_INLINE Scalar pivot_floor(Scalar diagonal) {
-  return Scalar(4) * machine_epsilon<Scalar>() * diagonal;
+template <class Value>
+AUVEST_INLINE Value pivot_floor(const Value& diagonal) {
+  return Value(4) * machine_epsilon<Value>() * diagonal;
 }
 
 /// pivot_floor() of all diagonal elements. False if one is not positive (or is NaN).
-template <class Scalar, int N>
-AUVEST_INLINE bool pivot_floors(const Matrix<Scalar, N, N>& a, Vector<Scalar, N>& floor) {
+template <class Value, int N>
+AUVEST_INLINE Mask<Value> pivot_floors(const Matrix<Value, N, N>& a, Vector<Value, N>& floor) {
+  Mask<Value> positive = a(0, 0) > Value(0);
   AUVEST_UNROLL
   for (int i = 0; i < N; ++i) {
-    if (!(a(i, i) > Scalar(0))) return false;
+    positive = positive && a(i, i) > Value(0);
     floor(i) = pivot_floor(a(i, i));
   }
-  return true;
+  return positive;
 }
+
+/// For a positive definite matrix: a pivot below its floor is raised to it, which adds a variance
+/// the format cannot resolve and keeps the root real.
+struct RaiseLostPivots {
+  template <class Value>
+  static AUVEST_INLINE void invert(const Value& pivot, const Value& floor, Value& root,
+                                   Value& inverse) {
+    const Value raised = larger(pivot, floor);
+    inverse = Value(1) / raised;
+    root = sqrt(raised);
+  }
+};
+
+/// For a positive *semi*definite matrix: a pivot that is zero to rounding gives columns of zeros,
+/// so the rank does not grow.
+struct DropLostPivots {
+  template <class Value>
+  static AUVEST_INLINE void invert(const Value& pivot, const Value& floor, Value& root,
+                                   Value& inverse) {
+    const Mask<Value> lost = !(pivot > floor);
+    const Value kept = select(lost, Value(1), pivot);
+    inverse = select(lost, Value(0), Value(1) / kept);
+    root = select(lost, Value(0), sqrt(kept));
+  }
+};
 
 /// The root of the leading O x O block of the symmetric matrix `p`, and the regression of the other
 /// components on the first O: with p the covariance of (v_o, v_u),
 ///
 ///     P_oo = root root',   v_u = slope v_o + (what v_o says nothing about),  slope = P_uo P_oo^-1.
 ///
-/// A pivot below its floor is raised to it, which adds a variance the format cannot resolve and
-/// keeps the root real. False if a diagonal element of the block is not positive (or is NaN).
-template <int O, int U, class Scalar, int N>
-AUVEST_OUTLINE bool factor_leading(const Matrix<Scalar, N, N>& p, Matrix<Scalar, O, O>& root,
-                                   Matrix<Scalar, U, O>& slope) {
+/// `LostPivots` says what becomes of pivots that are lost in rounding noise. False if a diagonal
+/// element of the block is not positive (or is NaN).
+template <class LostPivots = RaiseLostPivots, int O, int U, class Value, int N>
+AUVEST_OUTLINE AUVEST_INLINE Mask<Value> factor_leading(const Matrix<Value, N, N>& p,
+                                                        Matrix<Value, O, O>& root,
+                                                        Matrix<Value, U, O>& slope) {
   static_assert(0 < O && O <= N && U == other_states(N, O), "the first O of N components");
-  Matrix<Scalar, O, O> l;  // P_oo = L D L', unit lower triangular; D on the diagonal for a while
+  Matrix<Value, O, O> l;  // P_oo = L D L', unit lower triangular; D on the diagonal for a while
   AUVEST_UNROLL
   for (int i = 0; i < O; ++i) {
     AUVEST_UNROLL
     for (int j = 0; j <= i; ++j) l(i, j) = p(i, j);
   }
-  Vector<Scalar, O> floor;
-  if (!pivot_floors(l, floor)) return false;
-  Vector<Scalar, O> inverse;
+  Vector<Value, O> floor;
+  const Mask<Value> positive = pivot_floors(l, floor);
+  Vector<Value, O> inverse;
   AUVEST_UNROLL
   for (int k = 0; k < O; ++k) {
-    const Scalar pivot = l(k, k) < floor(k) ? floor(k) : l(k, k);
-    inverse(k) = Scalar(1) / pivot;
-    root(k, k) = sqrt(pivot);
+    LostPivots::invert(l(k, k), floor(k), root(k, k), inverse(k));
     AUVEST_UNROLL
     for (int i = O - 1; i > k; --i) {  // upwards: row i needs the unscaled column above it
-      const Scalar scaled = l(i, k) * inverse(k);
+      const Value scaled = l(i, k) * inverse(k);
       AUVEST_UNROLL
       for (int j = k + 1; j <= i; ++j) l(i, j) = l(i, j) - scaled * l(j, k);
       l(i, k) = scaled;
       root(i, k) = scaled * root(k, k);
-      root(k, i) = Scalar(0);
+      root(k, i) = Value(0);
     }
   }
   AUVEST_UNROLL
   for (int i = O; i < N; ++i) {
-    Vector<Scalar, O> row;
+    Vector<Value, O> row;
     AUVEST_UNROLL
     for (int k = 0; k < O; ++k) {
       row(k) = minus_dot(p(i, k), &l(k, 0), row.data(), k);
     }
     AUVEST_UNROLL
     for (int k = O - 1; k >= 0; --k) {
-      Scalar value = row(k) * inverse(k);
+      Value value = row(k) * inverse(k);
       AUVEST_UNROLL
       for (int j = k + 1; j < O; ++j) value = value - l(j, k) * slope(i - O, j);
       slope(i - O, k) = value;
     }
   }
-  return true;
+  return positive;
 }
 
 /// a = L D L' with a unit lower triangular L, in place: D on the diagonal, L below it. Pivots that
 /// are zero to rounding are floored as in factor_leading. False, with `a` left unusable, if `a`
 /// is indefinite or a diagonal element is not positive (or is NaN).
-template <class Scalar, int N>
-inline bool ldlt(Matrix<Scalar, N, N>& a) {
-  Vector<Scalar, N> floor;
-  if (!pivot_floors(a, floor)) return false;
+template <class Value, int N>
+AUVEST_INLINE Mask<Value> ldlt(Matrix<Value, N, N>& a) {
+  Vector<Value, N> floor;
+  Mask<Value> definite = pivot_floors(a, floor);
   AUVEST_UNROLL
   for (int k = 0; k < N; ++k) {
-    if (a(k, k) < -(Scalar(N) * floor(k))) return false;
-    if (a(k, k) < floor(k)) a(k, k) = floor(k);
+    definite = definite && !(a(k, k) < -(Value(N) * floor(k)));
+    a(k, k) = larger(a(k, k), floor(k));
     if (k + 1 == N) break;
-    const Scalar inverse = Scalar(1) / a(k, k);
+    const Value inverse = Value(1) / a(k, k);
     AUVEST_UNROLL
     for (int i = N - 1; i > k; --i) {  // upwards: row i needs the unscaled column above it
-      const Scalar l = a(i, k) * inverse;
+      const Value l = a(i, k) * inverse;
       AUVEST_UNROLL
       for (int j = k + 1; j <= i; ++j) a(i, j) = a(i, j) - l * a(j, k);
       a(i, k) = l;
     }
   }
-  return true;
+  return definite;
 }
 
 /// True if the symmetric matrix (lower triangle) is positive definite to working precision: no

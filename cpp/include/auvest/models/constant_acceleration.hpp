@@ -40,15 +40,8 @@ struct ConstantAcceleration : ProcessModel<ConstantAcceleration<Scalar_, Order>,
 
   /// Eq. (4): x(k+1) = Phi(dt) x(k).
   State f(const State& x, Scalar dt) const {
-    const Coefficients c(dt);
-    State next;
-    AUVEST_UNROLL
-    for (int i = 0; i < 6; ++i) {
-      Scalar value = x(i);
-      if (i + 2 < 6) value = value + c.first * x(i + 2);
-      if (Order == 2 && i + 4 < 6) value = value + c.second * x(i + 4);
-      next(i) = value;
-    }
+    State next = x;
+    shift(next, Coefficients(dt));
     return next;
   }
 
@@ -78,26 +71,27 @@ struct ConstantAcceleration : ProcessModel<ConstantAcceleration<Scalar_, Order>,
 
   /// x <- Phi x, P <- Phi P Phi' + Q in place. Row by row, every element is formed from elements
   /// further down or to the right, which still hold their old values.
-  AUVEST_OUTLINE void propagate(Belief<Scalar, 6>& belief, Scalar dt) const {
+  template <class Value>
+  AUVEST_OUTLINE void propagate(Belief<Value, 6>& belief, Scalar dt) const {
     const Coefficients c(dt);
-    Covariance& p = belief.P;
+    Matrix<Value, 6, 6>& p = belief.P;
     AUVEST_UNROLL
     for (int i = 0; i < 6; ++i) {
-      Scalar row[6];  // of Phi P
+      Value row[6];  // of Phi P
       AUVEST_UNROLL
       for (int j = 0; j < 6; ++j) {
         if (j <= i + 2 * Order) row[j] = column(p, i, j, c);
       }
       AUVEST_UNROLL
       for (int j = 0; j <= i; ++j) {
-        Scalar value = row[j];
+        Value value = row[j];
         if (j + 2 < 6) value = value + c.first * row[j + 2];
         if (Order == 2 && j + 4 < 6) value = value + c.second * row[j + 4];
         p(i, j) = value;
       }
     }
     add_noise(p, dt);
-    math::copy(f(belief.x, dt), belief.x);
+    shift(belief.x, c);
   }
 
   /// P_xx + P_yy after dt seconds, without forming the rest of P.
@@ -126,15 +120,29 @@ struct ConstantAcceleration : ProcessModel<ConstantAcceleration<Scalar_, Order>,
     explicit Coefficients(Scalar dt) : first(dt), second(Scalar(0.5) * dt * dt) {}
   };
 
+  /// x <- Phi x: each element needs those behind it, which still hold their old values.
+  template <class Value>
+  static AUVEST_INLINE void shift(Vector<Value, 6>& x, const Coefficients& c) {
+    AUVEST_UNROLL
+    for (int i = 0; i < 4; ++i) {
+      Value value = x(i) + c.first * x(i + 2);
+      if (Order == 2 && i < 2) value = value + c.second * x(i + 4);
+      x(i) = value;
+    }
+  }
+
   /// Element (i, j) of Phi P, from the lower triangle of P.
-  static AUVEST_INLINE Scalar column(const Covariance& p, int i, int j, const Coefficients& c) {
-    Scalar value = at(p, i, j);
+  template <class Value>
+  static AUVEST_INLINE Value column(const Matrix<Value, 6, 6>& p, int i, int j,
+                                    const Coefficients& c) {
+    Value value = at(p, i, j);
     if (i + 2 < 6) value = value + c.first * at(p, i + 2, j);
     if (Order == 2 && i + 4 < 6) value = value + c.second * at(p, i + 4, j);
     return value;
   }
 
-  static AUVEST_INLINE Scalar at(const Covariance& p, int i, int j) {
+  template <class Value>
+  static AUVEST_INLINE const Value& at(const Matrix<Value, 6, 6>& p, int i, int j) {
     return i >= j ? p(i, j) : p(j, i);
   }
 
@@ -145,7 +153,8 @@ struct ConstantAcceleration : ProcessModel<ConstantAcceleration<Scalar_, Order>,
                  dt2 * (params.velocity / Scalar(3) + dt2 * (params.acceleration / Scalar(20))));
   }
 
-  AUVEST_INLINE void add_noise(Covariance& p, Scalar dt) const {
+  template <class Value>
+  AUVEST_INLINE void add_noise(Matrix<Value, 6, 6>& p, Scalar dt) const {
     const Scalar q_v = params.velocity;
     const Scalar q_a = params.acceleration;
     const Scalar dt2 = dt * dt;
