@@ -71,6 +71,8 @@ struct NumTraits<ExplicitDouble> : NumTraits<double> {
 namespace auvest {
 namespace math {
 
+inline ExplicitDouble exp(ExplicitDouble x) { return ExplicitDouble(exp(double(x))); }
+inline ExplicitDouble log(ExplicitDouble x) { return ExplicitDouble(log(double(x))); }
 inline ExplicitDouble sqrt(ExplicitDouble x) { return ExplicitDouble(sqrt(double(x))); }
 inline bool is_finite(ExplicitDouble x) { return is_finite(double(x)); }
 inline ExplicitDouble wrap(ExplicitDouble x) { return ExplicitDouble(wrap(double(x))); }

@@ -34,6 +34,18 @@ struct Uniform;
 
 }  // namespace detail
 
+/// Two independent standard normal deviates from two uniform ones in [0, 1).
+template <class Value>
+AUVEST_INLINE void box_muller(const Value& u, const Value& v, Value& a, Value& b) {
+  const Value above_zero = Value(1) - u;  // (0, 1], exact
+  const Value angle_rad = two_pi<Value>() * v;
+  const Value radius = sqrt(Value(-2) * log(above_zero));
+  Value sine, cosine;
+  sincos(angle_rad, sine, cosine);
+  a = radius * cosine;
+  b = radius * sine;
+}
+
 /// A stream of random numbers. Copyable; a copy repeats the stream from where it was taken.
 class Random {
  public:
@@ -95,13 +107,9 @@ class Random {
   /// |a|, |b| <= 5.77 in float, 8.57 in double.
   template <class Scalar>
   void normal_pair(Scalar& a, Scalar& b) {
-    const Scalar above_zero = Scalar(1) - uniform<Scalar>();  // (0, 1], exact
-    const Scalar angle_rad = two_pi<Scalar>() * uniform<Scalar>();
-    const Scalar radius = math::sqrt(Scalar(-2) * math::log(above_zero));
-    Scalar sine, cosine;
-    math::sincos(angle_rad, sine, cosine);
-    a = radius * cosine;
-    b = radius * sine;
+    const Scalar u = uniform<Scalar>();
+    const Scalar v = uniform<Scalar>();
+    box_muller(u, v, a, b);
   }
 
   /// The first deviate of a normal_pair(); the second is dropped, so that the number of words taken
@@ -138,10 +146,9 @@ struct Uniform<Scalar, 4> {
 template <class Scalar>
 struct Uniform<Scalar, 8> {
   static Scalar draw(Random& random) {
-    const uint64_t high = random.next_u32() >> 5;
-    const uint64_t low = random.next_u32() >> 6;
-    const int64_t bits = static_cast<int64_t>((high << 26) | low);
-    return static_cast<Scalar>(bits) * Scalar(1.1102230246251565e-16);  // 2^-53
+    const Scalar high = static_cast<Scalar>(static_cast<int32_t>(random.next_u32() >> 5));
+    const Scalar low = static_cast<Scalar>(static_cast<int32_t>(random.next_u32() >> 6));
+    return (high * Scalar(67108864.0) + low) * Scalar(1.1102230246251565e-16);  // 2^26, 2^-53
   }
 };
 
