@@ -3,6 +3,8 @@
 
 #include <doctest/doctest.h>
 
+#include <vector>
+
 #include "auvest/auvest.hpp"
 
 namespace {
@@ -113,6 +115,76 @@ TEST_CASE("explicit scalar: same bits as double") {
     CHECK(double(a(i)) == b(i));
     CHECK(double(c(i)) == d(i));
   }
+}
+
+/// SLATF, EKF-SLAT and dead reckoning over a few steps; the slave's estimates one after the other.
+template <class Scalar>
+struct Slat {
+  template <class Filter>
+  static void run(Filter& filter, std::vector<double>& numbers) {
+    constexpr int pose = Filter::kPose;
+    auvest::math::Random random(1);
+    typename Filter::SlaveBelief start;
+    typename Filter::MasterBelief master;
+    auvest::math::set_zero(start.x);
+    auvest::math::set_zero(start.P);
+    auvest::math::set_zero(master.x);
+    auvest::math::set_zero(master.P);
+    for (int i = 0; i < pose; ++i) start.P(i, i) = Scalar(0.01);
+    for (int i = 0; i < 6; ++i) master.P(i, i) = Scalar(0.5);
+    master.x(1) = Scalar(50);
+    REQUIRE(filter.reset(start, random) == auvest::Status::kOk);
+    REQUIRE(filter.add_master(master) == auvest::Status::kOk);
+    typename Filter::VelocityChange change;
+    change(0) = change(1) = Scalar(0.01);
+    for (int k = 0; k < 10; ++k) {
+      typename Filter::Control u;
+      u(0) = Scalar(2);
+      u(1) = Scalar(0.1);
+      REQUIRE(filter.predict(Scalar(1), u, random, &change) == auvest::Status::kOk);
+      auvest::Sighting<Scalar> seen;
+      seen.master = 0;
+      seen.z(0) = Scalar(50 - k);
+      seen.z(1) = Scalar(-1.5);
+      REQUIRE(filter.update(&seen, 1, auvest::Sonar<Scalar>(), random) == auvest::Status::kOk);
+      const auto slave = filter.slave();
+      for (int i = 0; i < pose; ++i) {
+        numbers.push_back(double(slave.x(i)));
+        numbers.push_back(double(slave.P(i, i)));
+      }
+    }
+  }
+
+  template <class Proposal, class Motion>
+  static void particles(std::vector<double>& numbers) {
+    using Filter = auvest::Slatf<Motion, auvest::PiecewiseAcceleration<Scalar>, Proposal, 1>;
+    typename Filter::template Storage<20> storage;
+    Filter filter(Motion(), auvest::PiecewiseAcceleration<Scalar>(), typename Filter::Params(),
+                  storage);
+    run(filter, numbers);
+    numbers.push_back(double(filter.master(0).P(5, 5)));
+    numbers.push_back(double(filter.log_likelihood()));
+  }
+
+  static std::vector<double> all() {
+    using Compass = auvest::CompassMotion<Scalar>;
+    using Unicycle = auvest::UnicycleMotion<Scalar>;
+    std::vector<double> numbers;
+    particles<auvest::MotionProposal, Compass>(numbers);
+    particles<auvest::MeasurementProposal, Compass>(numbers);
+    particles<auvest::MotionProposal, Unicycle>(numbers);
+    particles<auvest::MeasurementProposal, Unicycle>(numbers);
+    auvest::EkfSlat<Unicycle, auvest::PiecewiseAcceleration<Scalar>, 1> ekf(
+        (Unicycle()), auvest::PiecewiseAcceleration<Scalar>());
+    run(ekf, numbers);
+    auvest::DeadReckoning<Compass> reckoning((Compass()));
+    run(reckoning, numbers);
+    return numbers;
+  }
+};
+
+TEST_CASE("explicit scalar: the SLAT filters compute the bits of double") {
+  CHECK(Slat<ExplicitDouble>::all() == Slat<double>::all());
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include "auvest/math/random.hpp"
 #include "auvest/models/constant_acceleration.hpp"
 #include "auvest/models/linear.hpp"
+#include "auvest/models/piecewise_acceleration.hpp"
 #include "auvest/models/range_bearing.hpp"
 
 namespace {
@@ -148,6 +149,7 @@ auvest::RangeBearing<double, 6> sonar() {
 
 TEST_CASE("process models") {
   check_process(auvest::EulerAcceleration<double>(), 0.5);
+  check_process(auvest::PiecewiseAcceleration<double>(), 0.7);
   check_process(auvest::ExactAcceleration<double>(), 0.5);
   check_process(auvest::ExactAcceleration<double>(), 30);
   Matrix<double, 3, 3> phi;

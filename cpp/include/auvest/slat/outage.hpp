@@ -1,0 +1,93 @@
+// The use of the paper, section 6: communication fails, the slave goes on alone from the last state
+// it was told; it returns, and the slave takes what it is told again.
+//
+//     outage.share(slave, masters, 1)   communication works: the state that all agree on
+//     outage.predict(...), update(...)  no word came: the filter starts from the last shared state
+//     outage.slave()                    the shared state, or the filter's
+//
+// Filter: Slatf, EkfSlat or DeadReckoning.
+#pragma once
+
+#include <cstdint>
+
+#include "auvest/math/random.hpp"
+#include "auvest/slat/sighting.hpp"
+#include "auvest/status.hpp"
+#include "auvest/types.hpp"
+
+namespace auvest {
+
+enum class Communication : std::uint8_t {
+  kNever,  ///< nothing was shared yet
+  kUp,     ///< the last word is a shared state
+  kDown    ///< the filter runs
+};
+
+template <class Filter_, int Masters>
+class Outage {
+ public:
+  using Filter = Filter_;
+  using Scalar = typename Filter::Scalar;
+  using Control = typename Filter::Control;
+  using SlaveBelief = typename Filter::SlaveBelief;
+  using MasterBelief = typename Filter::MasterBelief;
+  using VelocityChange = typename Filter::VelocityChange;
+
+  explicit Outage(const Filter& filter) : filter_(filter), mode_(Communication::kNever) {}
+
+  /// Takes over what communication brings, and ends an outage. `masters` holds `count` beliefs.
+  Status share(const SlaveBelief& slave, const MasterBelief* masters, int count) {
+    if (count < 0 || count > Masters) return Status::kBadParameter;
+    if (!math::all_finite(slave.x) || !math::lower_finite(slave.P)) return Status::kNotFinite;
+    for (int n = 0; n < count; ++n) {
+      if (!math::all_finite(masters[n].x) || !math::lower_finite(masters[n].P)) {
+        return Status::kNotFinite;
+      }
+      if (!math::is_positive_definite(masters[n].P)) return Status::kNotPositiveDefinite;
+    }
+    slave_ = slave;
+    count_ = count;
+    for (int n = 0; n < count; ++n) masters_[n] = masters[n];
+    mode_ = Communication::kUp;
+    return Status::kOk;
+  }
+
+  /// The first prediction after a shared state starts the filter from it.
+  Status predict(Scalar dt, const Control& u, math::Random& random,
+                 const VelocityChange* changes = nullptr) {
+    if (mode_ == Communication::kNever) return Status::kNotInitialised;
+    if (mode_ == Communication::kUp) {
+      Status status = filter_.reset(slave_, random);
+      for (int n = 0; n < count_ && status == Status::kOk; ++n) {
+        status = filter_.add_master(masters_[n]);
+      }
+      if (status != Status::kOk) return status;
+      mode_ = Communication::kDown;
+    }
+    return filter_.predict(dt, u, random, changes);
+  }
+
+  /// An echo counts only while the filter runs.
+  Status update(const Sighting<Scalar>* sightings, int count, const Sonar<Scalar>& sonar,
+                math::Random& random) {
+    if (mode_ == Communication::kNever) return Status::kNotInitialised;
+    return mode_ == Communication::kUp ? Status::kOk
+                                       : filter_.update(sightings, count, sonar, random);
+  }
+
+  SlaveBelief slave() const { return mode_ == Communication::kDown ? filter_.slave() : slave_; }
+  MasterBelief master(int n) const {
+    return mode_ == Communication::kDown ? filter_.master(n) : masters_[n];
+  }
+  Communication mode() const { return mode_; }
+  const Filter& filter() const { return filter_; }
+
+ private:
+  Filter filter_;
+  SlaveBelief slave_;
+  MasterBelief masters_[Masters];
+  int count_ = 0;
+  Communication mode_;
+};
+
+}  // namespace auvest

@@ -1,0 +1,287 @@
+// EKF-SLAT against a dense textbook filter, against the EKF of the master, and for consistency;
+// dead reckoning and the outage around the filters.
+#include <doctest/doctest.h>
+
+#include "close.hpp"
+
+#include <Eigen/LU>
+#include <cmath>
+
+#include "auvest/filters/ekf.hpp"
+#include "auvest/models/piecewise_acceleration.hpp"
+#include "auvest/models/range_bearing.hpp"
+#include "auvest/models/slave_motion.hpp"
+#include "auvest/scenarios/slat.hpp"
+#include "auvest/slat/dead_reckoning.hpp"
+#include "auvest/slat/ekf_slat.hpp"
+#include "auvest/slat/outage.hpp"
+
+namespace {
+
+using auvest::Belief;
+using auvest::Matrix;
+using auvest::Sighting;
+using auvest::SlatScenario;
+using auvest::Status;
+using auvest::Vector;
+using auvest::math::Random;
+
+template <class Scalar>
+using Compass = auvest::CompassMotion<Scalar>;
+template <class Scalar>
+using Master = auvest::PiecewiseAcceleration<Scalar>;
+
+template <class Scalar>
+Belief<Scalar, 6> master_belief(double x, double y) {
+  Belief<Scalar, 6> belief;
+  belief.x << Scalar(x), Scalar(y), Scalar(2), Scalar(-1), Scalar(0.01), Scalar(0);
+  belief.P.setZero();
+  for (int i = 0; i < 6; ++i) belief.P(i, i) = Scalar(i < 2 ? 4 : 0.01);
+  return belief;
+}
+
+TEST_CASE_TEMPLATE("EKF-SLAT: with a slave that is known it is the EKF of the master, bit for bit",
+                   Scalar, float, double) {
+  typename Compass<Scalar>::Params still;
+  still.sigma_speed_mps = still.sigma_heading_rad = Scalar(0);
+  auvest::EkfSlat<Compass<Scalar>, Master<Scalar>, 1> slat((Compass<Scalar>(still)),
+                                                           Master<Scalar>());
+  Random random(1);
+  Belief<Scalar, 2> start;
+  start.x << Scalar(10), Scalar(20);
+  start.P.setZero();
+  REQUIRE(slat.reset(start, random) == Status::kOk);
+  const auto prior = master_belief<Scalar>(200, 100);
+  REQUIRE(slat.add_master(prior) == Status::kOk);
+  auvest::Ekf<Master<Scalar>> ekf{Master<Scalar>()};
+  REQUIRE(ekf.reset(prior.x, prior.P) == Status::kOk);
+  typename auvest::Sonar<Scalar>::Params sonar;
+  sonar.bearing = auvest::Bearing::kSlaveToMaster;
+  for (int k = 0; k < 100; ++k) {
+    const Vector<Scalar, 2> u(Scalar(3), Scalar(0.01 * k));
+    REQUIRE(slat.predict(Scalar(1), u, random) == Status::kOk);
+    REQUIRE(ekf.predict(Scalar(1)) == Status::kOk);
+    typename auvest::RangeBearing<Scalar, 6>::Params station;
+    station.sigma_range_m = sonar.sigma_range_m;
+    station.sigma_bearing_rad = sonar.sigma_bearing_rad;
+    station.near_field = Scalar(0);
+    station.station_x_m = slat.slave().x(0);
+    station.station_y_m = slat.slave().x(1);
+    Sighting<Scalar> seen;
+    seen.master = 0;
+    seen.z << Scalar(200 + random.normal<double>()), Scalar(0.4 + 0.05 * random.normal<double>());
+    REQUIRE(slat.update(&seen, 1, auvest::Sonar<Scalar>(sonar), random) == Status::kOk);
+    REQUIRE(ekf.update(seen.z, auvest::RangeBearing<Scalar, 6>(station)).status == Status::kOk);
+  }
+  const auto master = slat.master(0);
+  for (int i = 0; i < 6; ++i) {
+    CHECK(master.x(i) == ekf.x()(i));
+    for (int j = 0; j <= i; ++j) CHECK(master.P(i, j) == ekf.belief().P(i, j));
+  }
+}
+
+/// Random predictions and sightings of two masters, beside a dense filter with S^-1 and P - K S K'.
+template <class Motion>
+void check_textbook(const Motion& motion, const Belief<double, Motion::kStates>& start,
+                    auvest::Bearing bearing) {
+  constexpr int pose = Motion::kStates;
+  constexpr int n = pose + 12;
+  auvest::EkfSlat<Motion, Master<double>, 2> slat(motion, Master<double>());
+  Random random(2);
+  REQUIRE(slat.reset(start, random) == Status::kOk);
+  Eigen::Matrix<double, n, 1> x = Eigen::Matrix<double, n, 1>::Zero();
+  Eigen::Matrix<double, n, n> P = Eigen::Matrix<double, n, n>::Zero();
+  x.template head<pose>() = start.x;
+  P.template topLeftCorner<pose, pose>() = start.P;
+  for (int m = 0; m < 2; ++m) {
+    const auto belief = master_belief<double>(150 - 250 * m, 200);
+    REQUIRE(slat.add_master(belief) == Status::kOk);
+    x.template segment<6>(pose + 6 * m) = belief.x;
+    P.template block<6, 6>(pose + 6 * m, pose + 6 * m) = belief.P;
+  }
+  auvest::Sonar<double>::Params params;
+  params.bearing = bearing;
+  const auvest::Sonar<double> sonar(params);
+  double log_likelihood = 0;
+  for (int k = 0; k < 60; ++k) {
+    const Vector<double, 2> u(2, 0.1);
+    const double dt = 0.5;
+    REQUIRE(slat.predict(dt, u, random) == Status::kOk);
+    const auto step = motion.step(u, dt);
+    Belief<double, pose> slave;
+    slave.x = x.template head<pose>();
+    slave.P.setZero();
+    Eigen::Matrix<double, n, n> phi = Eigen::Matrix<double, n, n>::Identity();
+    Eigen::Matrix<double, n, n> q = Eigen::Matrix<double, n, n>::Zero();
+    phi.template topLeftCorner<pose, pose>() = motion.transition(step, slave.x);
+    q.template topLeftCorner<pose, pose>() = motion.noise(step, slave.x);
+    motion.propagate(step, slave);
+    for (int m = 0; m < 2; ++m) {
+      phi.template block<6, 6>(pose + 6 * m, pose + 6 * m) =
+          Master<double>().Phi(Vector<double, 6>::Zero(), dt);
+      q.template block<6, 6>(pose + 6 * m, pose + 6 * m) = Master<double>().Q(dt);
+    }
+    x = (phi * x).eval();
+    x.template head<pose>() = slave.x;
+    P = (phi * P * phi.transpose() + q).eval();
+
+    const int seen_master = (k / 3) % 2;
+    Sighting<double> seen;
+    seen.master = seen_master;
+    const int at = pose + 6 * seen_master;
+    auvest::Sonar<double>::View<double, pose> view;
+    const Vector<double, pose> here = x.template head<pose>();
+    sonar.look(here, x(at), x(at + 1), Vector<double, 2>(0, 0), view);
+    seen.z << -view.innovation(0) + random.normal<double>(),
+        auvest::math::wrap(-view.innovation(1) + 0.06 * random.normal<double>());
+    sonar.look(here, x(at), x(at + 1), seen.z, view);
+    Eigen::Matrix<double, 2, n> h = Eigen::Matrix<double, 2, n>::Zero();
+    h.template leftCols<pose>() = view.by_slave;
+    h.template middleCols<2>(at) = view.by_master;
+    const Eigen::Matrix2d s = h * P * h.transpose() + sonar.R<double>();
+    const Eigen::Matrix<double, n, 2> gain = P * h.transpose() * s.inverse();
+    x += gain * view.innovation;
+    P = (P - gain * s * gain.transpose()).eval();
+    if (pose > 2) x(pose - 1) = auvest::math::wrap(x(pose - 1));
+    const double nis = view.innovation.dot(s.inverse() * view.innovation);
+    log_likelihood -=
+        0.5 * (nis + std::log(s.determinant())) + std::log(2 * auvest::math::pi<double>());
+    REQUIRE(slat.update(&seen, 1, sonar, random) == Status::kOk);
+    CHECK(slat.nis() == close_to(nis, 1e-7));
+  }
+  for (int i = 0; i < n; ++i) {
+    CHECK(std::fabs(slat.belief().x(i) - x(i)) < 1e-8);
+    for (int j = 0; j <= i; ++j) CHECK(std::fabs(slat.belief().P(i, j) - P(i, j)) < 1e-8);
+  }
+  CHECK(slat.log_likelihood() == close_to(log_likelihood, 1e-9));
+}
+
+TEST_CASE("EKF-SLAT: two masters, against a dense filter with S^-1") {
+  Belief<double, 2> start;
+  start.x << 1, 2;
+  start.P << 2, 0.3, 0.3, 1;
+  check_textbook(Compass<double>(), start, auvest::Bearing::kMasterToSlave);
+  Belief<double, 3> oriented;
+  oriented.x << 1, 2, 3.0;
+  oriented.P = 0.01 * Matrix<double, 3, 3>::Identity();
+  check_textbook(auvest::UnicycleMotion<double>(), oriented, auvest::Bearing::kFromHeading);
+}
+
+TEST_CASE("EKF-SLAT: NEES and NIS lie inside their chi-square bounds where the model holds") {
+  // Precise odometry, so that the motion is close to linear; everything else is section 7.
+  SlatScenario scenario;
+  scenario.sigma_speed_mps = 0.3;
+  scenario.sigma_heading_rad = 0.03;
+  Compass<double>::Params motion;
+  motion.sigma_speed_mps = scenario.sigma_speed_mps;
+  motion.sigma_heading_rad = scenario.sigma_heading_rad;
+  using Filter = auvest::EkfSlat<Compass<double>, Master<double>, 1>;
+  const int runs = 60;
+  double nees = 0, nis = 0;
+  int updates = 0;
+  for (int run = 0; run < runs; ++run) {
+    Filter filter((Compass<double>(motion)), Master<double>());
+    Random world(91, static_cast<std::uint64_t>(run));
+    Random random(0);
+    Vector<double, 2> error;
+    const Status status = auvest::run_slat(filter, auvest::Sonar<double>(), scenario, world, random,
+                                           [&](const auvest::SlatStep<Filter>& step) {
+                                             for (int i = 0; i < 2; ++i)
+                                               error(i) =
+                                                   filter.slave().x(i) - step.slave.position[i];
+                                             nis += filter.nis();
+                                             ++updates;
+                                           });
+    REQUIRE(status == Status::kOk);
+    const Eigen::Matrix2d P = filter.slave().P;
+    nees += error.dot(P.inverse() * error);  // at the end: independent over runs
+  }
+  // Chi-square with 2 degrees per run or echo; its sum is nearly normal: 99.9 %.
+  const double nees_sigma = 3.3 * std::sqrt(4.0 / runs);
+  CHECK(std::fabs(nees / runs - 2) < nees_sigma);
+  CHECK(std::fabs(nis / updates - 2) < 3.3 * std::sqrt(4.0 / updates));
+}
+
+TEST_CASE("dead reckoning: the paper's bias in section 7 and its compensation") {
+  for (const bool compensate : {false, true}) {
+    Compass<double>::Params motion;
+    motion.compensate_bias = compensate;
+    using Filter = auvest::DeadReckoning<Compass<double>>;
+    double along = 0;
+    const int runs = 200;
+    for (int run = 0; run < runs; ++run) {
+      Filter filter((Compass<double>(motion)));
+      Random world(92, static_cast<std::uint64_t>(run));
+      Random random(0);
+      double last = 0;
+      REQUIRE(auvest::run_slat(filter, auvest::Sonar<double>(), SlatScenario(), world, random,
+                               [&](const auvest::SlatStep<Filter>& step) {
+                                 const auto x = filter.slave().x;
+                                 const double c = std::cos(step.slave.heading);
+                                 const double s = std::sin(step.slave.heading);
+                                 last = c * (x(0) - step.slave.position[0]) +
+                                        s * (x(1) - step.slave.position[1]);
+                               }) == Status::kOk);
+      along += last / runs;
+    }
+    // 400 s at 5.1444 m/s, 4.4 % short; the spread is 2 m/s * sqrt(400) = 40 m per run.
+    const double expected = compensate ? 0 : 5.1444 * 400 * (std::exp(-0.045) - 1);
+    CHECK(std::fabs(along - expected) < 4 * 42 / std::sqrt(1.0 * runs));
+  }
+}
+
+TEST_CASE("outage: starts from the last shared state, hands over when communication returns") {
+  using Filter = auvest::EkfSlat<Compass<double>, Master<double>, 1>;
+  auvest::Outage<Filter, 1> outage(Filter((Compass<double>()), Master<double>()));
+  Random random(3);
+  const Vector<double, 2> u(5, 0.2);
+  const auvest::Sonar<double> sonar;
+  Sighting<double> seen;
+  seen.master = 0;
+  seen.z << 220, -2;
+  CHECK(outage.predict(1, u, random) == Status::kNotInitialised);
+  CHECK(outage.update(&seen, 1, sonar, random) == Status::kNotInitialised);
+
+  Belief<double, 2> slave;
+  slave.x << 7, 8;
+  slave.P << 0.5, 0, 0, 0.5;
+  auto master = master_belief<double>(100, 200);
+  CHECK(outage.share(slave, &master, 2) == Status::kBadParameter);
+  REQUIRE(outage.share(slave, &master, 1) == Status::kOk);
+  CHECK(outage.mode() == auvest::Communication::kUp);
+  CHECK(outage.slave().x == slave.x);
+  // While communication works, an echo changes nothing.
+  CHECK(outage.update(&seen, 1, sonar, random) == Status::kOk);
+  CHECK(outage.slave().x == slave.x);
+  CHECK(outage.master(0).x == master.x);
+
+  // The outage: what the filter alone would do from the shared state.
+  Filter alone((Compass<double>()), Master<double>());
+  REQUIRE(alone.reset(slave, random) == Status::kOk);
+  REQUIRE(alone.add_master(master) == Status::kOk);
+  for (int k = 0; k < 5; ++k) {
+    REQUIRE(outage.predict(1, u, random) == Status::kOk);
+    REQUIRE(outage.update(&seen, 1, sonar, random) == Status::kOk);
+    REQUIRE(alone.predict(1, u, random) == Status::kOk);
+    REQUIRE(alone.update(&seen, 1, sonar, random) == Status::kOk);
+  }
+  CHECK(outage.mode() == auvest::Communication::kDown);
+  CHECK(outage.slave().x == alone.slave().x);
+  CHECK(outage.master(0).x == alone.master(0).x);
+
+  // It returns, and fails again: the second outage knows nothing of the first.
+  slave.x << 50, 60;
+  REQUIRE(outage.share(slave, &master, 1) == Status::kOk);
+  CHECK(outage.slave().x == slave.x);
+  REQUIRE(outage.predict(1, u, random) == Status::kOk);
+  REQUIRE(alone.reset(slave, random) == Status::kOk);
+  REQUIRE(alone.predict(1, u, random) == Status::kOk);
+  CHECK(outage.slave().x == alone.slave().x);
+  master.P.setZero();
+  CHECK(outage.share(slave, &master, 1) == Status::kNotPositiveDefinite);
+  slave.x(0) = std::nan("");
+  CHECK(outage.share(slave, &master, 0) == Status::kNotFinite);
+  CHECK(outage.mode() == auvest::Communication::kDown);
+}
+
+}  // namespace
