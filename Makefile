@@ -18,7 +18,7 @@ FIRMWARE_PACKAGES := arduino-builder arduino-core-avr gcc-avr avr-libc binutils-
     simavr libsimavr-dev libelf-dev \
     gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib qemu-system-arm
 DEV_PACKAGES := $(PACKAGES) $(FIRMWARE_PACKAGES) \
-    clang libclang-rt-dev doctest-dev clang-format valgrind
+    clang libclang-rt-dev doctest-dev libxsimd-dev clang-format valgrind
 
 CXX_FILES = $(shell find cpp firmware tests -name '*.hpp' -o -name '*.cpp' -o -name '*.h')
 # What the Python module is compiled from.

@@ -10,9 +10,13 @@ AVR = ("-c", "-mmcu=atmega2560", "-std=gnu++11")
 STRICT = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wdouble-promotion", "-Werror")
 AVR_STD = package.ROOT / "firmware" / "avr_std"
 HEADERS = sorted(path.name for path in AVR_STD.iterdir())
+HOST_ONLY = {"auvest/math/simd.hpp", "auvest/particles/simd_lanes.hpp"}  # they need xsimd
 PUBLIC = sorted(
-    path.relative_to(package.ROOT / "cpp" / "include").as_posix()
-    for path in (package.ROOT / "cpp" / "include").rglob("*.hpp")
+    {
+        path.relative_to(package.ROOT / "cpp" / "include").as_posix()
+        for path in (package.ROOT / "cpp" / "include").rglob("*.hpp")
+    }
+    - HOST_ONLY
 )
 OUR_PATHS = (f"-I{AVR_STD}",)
 AUVEST_PATHS = (f"-I{package.ROOT / 'cpp' / 'include'}", *OUR_PATHS, "-I/usr/include/eigen3")

@@ -16,21 +16,49 @@
 
 namespace auvest {
 namespace math {
+namespace detail {
+
+/// e^r for |r| <= ln(2)/2 after x = k ln 2 + r; `shifted` has k in its last bits. ln 2 in two
+/// parts: k times the first (15 bits) is exact.
+template <class Value>
+AUVEST_INLINE Value exp_kernel(const Value& x, Value& shifted) {
+  const Value shift(12582912.0f);  // 1.5 * 2^23: adding it rounds to an integer
+  shifted = x * Value(1.44269504f) + shift;
+  const Value k = shifted - shift;
+  const Value r = (x - k * Value(6.93145752e-01f)) - k * Value(1.42860677e-06f);
+  const Value p = Value(4.99999934e-01f) +
+                  r * (Value(1.66665204e-01f) +
+                       r * (Value(4.16683893e-02f) +
+                            r * (Value(8.36874583e-03f) + r * Value(1.38146205e-03f))));
+  return Value(1) + (r + (r * r) * p);
+}
+
+/// ln(m 2^k), sqrt(1/2) <= m < sqrt(2): ln(1 + f) = f - f^2/2 + f^3 P(f).
+template <class Value>
+AUVEST_INLINE Value log_kernel(const Value& m, const Value& k) {
+  const Value f = m - Value(1);  // exact
+  const Value u = f * f;
+  const Value p =
+      Value(3.33333313e-01f) +
+      f * (Value(-2.50008225e-01f) +
+           f * (Value(2.00012267e-01f) +
+                f * (Value(-1.66233569e-01f) +
+                     f * (Value(1.42017558e-01f) +
+                          f * (Value(-1.31601885e-01f) +
+                               f * (Value(1.27615809e-01f) + f * Value(-7.63447732e-02f)))))));
+  const Value tail = (f * u) * p + k * Value(1.42860677e-06f);
+  return k * Value(6.93145752e-01f) + (f + (tail - Value(0.5f) * u));
+}
+
+}  // namespace detail
 
 /// e^x. Above log(FLT_MAX): infinity. Results below FLT_MIN go through the subnormals to 0.
 inline float exp(float x) {
   if (is_nan(x)) return quiet_nan();
   if (x > 88.7228317f) return infinity();
   if (x < -104.0f) return 0.0f;
-  // x = k ln 2 + r, |r| <= ln(2)/2. ln 2 in two parts: k times the first (15 bits) is exact.
-  const float kShift = 12582912.0f;  // 1.5 * 2^23: adding it rounds to an integer
-  const float shifted = x * 1.44269504f + kShift;
-  const float k = shifted - kShift;
-  const float r = (x - k * 6.93145752e-01f) - k * 1.42860677e-06f;
-  const float p =
-      4.99999934e-01f +
-      r * (1.66665204e-01f + r * (4.16683893e-02f + r * (8.36874583e-03f + r * 1.38146205e-03f)));
-  const float e = 1.0f + (r + (r * r) * p);
+  float shifted;
+  const float e = detail::exp_kernel(x, shifted);
   return detail::scale_by_power(e, static_cast<int32_t>(to_bits(shifted) - 0x4b400000u));
 }
 
@@ -49,19 +77,7 @@ inline float log(float x) {
   bits += 0x3f800000u - 0x3f3504f3u;
   power += static_cast<int32_t>(bits >> 23);
   const float m = from_bits((bits & 0x007fffffu) + 0x3f3504f3u);
-  // ln(1 + f) = f - f^2/2 + f^3 P(f).
-  const float f = m - 1.0f;  // exact
-  const float u = f * f;
-  const float p =
-      3.33333313e-01f +
-      f * (-2.50008225e-01f +
-           f * (2.00012267e-01f +
-                f * (-1.66233569e-01f +
-                     f * (1.42017558e-01f +
-                          f * (-1.31601885e-01f + f * (1.27615809e-01f + f * -7.63447732e-02f))))));
-  const float k = static_cast<float>(power);
-  const float tail = (f * u) * p + k * 1.42860677e-06f;
-  return k * 6.93145752e-01f + (f + (tail - 0.5f * u));
+  return detail::log_kernel(m, static_cast<float>(power));
 }
 
 namespace detail {

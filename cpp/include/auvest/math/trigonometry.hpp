@@ -73,6 +73,54 @@ inline float turn_to_radian(uint64_t turn) {
   return from_bits(sign | (((exponent - 1u) << 23) + (product >> 8) + ((product >> 7) & 1u)));
 }
 
+/// sin(x) for |x| <= pi/4. The sign of a zero is lost.
+template <class Value>
+AUVEST_INLINE Value sin_kernel(const Value& x) {
+  const Value u = x * x;
+  const Value p =
+      Value(-1.66666552e-01f) + u * (Value(8.33218917e-03f) + u * Value(-1.95182845e-04f));
+  return x + x * (u * p);
+}
+
+/// cos(x) for |x| <= pi/4.
+template <class Value>
+AUVEST_INLINE Value cos_kernel(const Value& x) {
+  const Value u = x * x;
+  const Value p =
+      Value(4.16666456e-02f) + u * (Value(-1.38873095e-03f) + u * Value(2.44323273e-05f));
+  return (Value(1) - Value(0.5f) * u) + (u * u) * p;
+}
+
+/// x - k pi/2 for the integer k nearest to x 2/pi, |x| <= 96; `shifted` has k in its last bits.
+/// pi/2 in three parts: k times the first (18 bits) or the second (18 bits) is exact.
+template <class Value>
+AUVEST_INLINE Value reduce_near(const Value& x, Value& shifted) {
+  const Value shift(12582912.0f);  // 1.5 * 2^23: adding it rounds to an integer
+  shifted = x * Value(0.636619772f) + shift;
+  const Value k = shifted - shift;
+  const Value first = x - k * Value(1.57079315f);   // exact
+  const Value second = k * Value(3.17493686e-06f);  // exact
+  const Value high = first - second;
+  const Value lost = (first - high) - second;
+  return high + (lost - k * Value(2.56334407e-12f));
+}
+
+/// P(z^2) of atan(z) = z + z^3 P(z^2), |z| <= 1, from u = z^2. The terms alternate in sign: added
+/// in pairs they stay small.
+template <class Value>
+AUVEST_INLINE Value atan_polynomial(const Value& u) {
+  static const float kPolynomial[8] = {-3.33331525e-01f, 1.99937671e-01f,  -1.42110020e-01f,
+                                       1.06657691e-01f,  -7.55166039e-02f, 4.32047322e-02f,
+                                       -1.63631924e-02f, 2.91942270e-03f};
+  const Value v = u * u;
+  Value p = Value(kPolynomial[6]) + u * Value(kPolynomial[7]);
+  AUVEST_UNROLL
+  for (int i = 4; i >= 0; i -= 2) {
+    p = (Value(kPolynomial[i]) + u * Value(kPolynomial[i + 1])) + v * p;
+  }
+  return p;
+}
+
 /// The x in [-pi/4, pi/4] (plus a few ulp) and the number of quarter turns, modulo 4, that make up
 /// a finite angle.
 struct ReducedAngle {
@@ -84,15 +132,8 @@ inline ReducedAngle reduce_quarter(float x) {
   ReducedAngle reduced;
   const float size = absolute(x);
   if (size <= 96.0f) {
-    // pi/2 in three parts: k times the first (18 bits) or the second (18 bits) is exact.
-    const float kShift = 12582912.0f;  // 1.5 * 2^23: adding it rounds to an integer
-    const float shifted = x * 0.636619772f + kShift;
-    const float k = shifted - kShift;
-    const float first = x - k * 1.57079315f;   // exact
-    const float second = k * 3.17493686e-06f;  // exact
-    const float high = first - second;
-    const float lost = (first - high) - second;
-    reduced.angle_rad = high + (lost - k * 2.56334407e-12f);
+    float shifted;
+    reduced.angle_rad = reduce_near(x, shifted);
     reduced.quarter = to_bits(shifted) & 3u;
     return reduced;
   }
@@ -104,20 +145,6 @@ inline ReducedAngle reduce_quarter(float x) {
   reduced.angle_rad = negative ? -angle : angle;
   reduced.quarter = (negative ? 0u - count : count) & 3u;
   return reduced;
-}
-
-/// sin(x) for |x| <= pi/4. The sign of a zero is lost.
-AUVEST_INLINE float sin_kernel(float x) {
-  const float u = x * x;
-  const float p = -1.66666552e-01f + u * (8.33218917e-03f + u * -1.95182845e-04f);
-  return x + x * (u * p);
-}
-
-/// cos(x) for |x| <= pi/4.
-AUVEST_INLINE float cos_kernel(float x) {
-  const float u = x * x;
-  const float p = 4.16666456e-02f + u * (-1.38873095e-03f + u * 2.44323273e-05f);
-  return (1.0f - 0.5f * u) + (u * u) * p;
 }
 
 /// atan2() where |y / x| or |x / y|, whichever is smaller, is below 2^-100 or not a number.
@@ -289,9 +316,6 @@ AUVEST_OUTLINE AUVEST_INLINE float atan2(float y, float x) {
       {3.14159274f, -8.74227766e-08f, 0x80000000u},
       {1.57079637f, -4.37113883e-08f, 0u},
   };
-  static const float kPolynomial[8] = {-3.33331525e-01f, 1.99937671e-01f,  -1.42110020e-01f,
-                                       1.06657691e-01f,  -7.55166039e-02f, 4.32047322e-02f,
-                                       -1.63631924e-02f, 2.91942270e-03f};
   const float size_x = absolute(x);
   const float size_y = absolute(y);
   const float small = size_x < size_y ? size_x : size_y;
@@ -305,13 +329,8 @@ AUVEST_OUTLINE AUVEST_INLINE float atan2(float y, float x) {
   // Below 2^-12 z^3 / 3 is less than a sixth of an ulp of z; powers of z would become subnormal.
   float tail = o.low;
   if (ratio_bits >= 0x39800000u) {
-    // atan(z) = z + z^3 P(z^2). The terms alternate in sign: added in pairs they stay small.
     const float u = ratio * ratio;
-    const float v = u * u;
-    float p = kPolynomial[6] + u * kPolynomial[7];
-    AUVEST_UNROLL
-    for (int i = 4; i >= 0; i -= 2) p = (kPolynomial[i] + u * kPolynomial[i + 1]) + v * p;
-    tail = o.low + z * (u * p);
+    tail = o.low + z * (u * detail::atan_polynomial(u));
   }
   return copy_sign((o.high + z) + tail, y);
 }

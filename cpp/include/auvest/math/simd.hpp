@@ -1,0 +1,251 @@
+// The functions of this folder on batches of floats (xsimd), lane by lane the bits of the scalar
+// ones. Host only.
+//
+// Polynomials and reductions are the scalar code's own templates. What is rare there (infinities,
+// NaN, subnormals, angles beyond 96 rad) goes lane by lane through the scalar function.
+#pragma once
+
+#include <cfloat>
+#include <cstdint>
+#include <xsimd/xsimd.hpp>
+
+#include "auvest/math/angle.hpp"
+#include "auvest/math/basic.hpp"
+#include "auvest/math/exponential.hpp"
+#include "auvest/math/select.hpp"
+#include "auvest/math/trigonometry.hpp"
+
+namespace auvest {
+namespace math {
+
+/// One 32-bit unsigned integer per lane.
+template <class Arch>
+struct WordBatch {
+  using Batch = xsimd::batch<uint32_t, Arch>;
+  Batch v;
+
+  WordBatch() = default;
+  explicit AUVEST_INLINE WordBatch(uint32_t word) : v(word) {}
+  explicit AUVEST_INLINE WordBatch(const Batch& words) : v(words) {}
+
+  friend AUVEST_INLINE WordBatch operator+(const WordBatch& a, const WordBatch& b) {
+    return WordBatch(Batch(a.v + b.v));
+  }
+  friend AUVEST_INLINE WordBatch operator^(const WordBatch& a, const WordBatch& b) {
+    return WordBatch(Batch(a.v ^ b.v));
+  }
+  friend AUVEST_INLINE WordBatch operator&(const WordBatch& a, const WordBatch& b) {
+    return WordBatch(Batch(a.v & b.v));
+  }
+  friend AUVEST_INLINE WordBatch operator|(const WordBatch& a, const WordBatch& b) {
+    return WordBatch(Batch(a.v | b.v));
+  }
+  friend AUVEST_INLINE WordBatch operator<<(const WordBatch& a, int count) {
+    return WordBatch(Batch(a.v << count));
+  }
+  friend AUVEST_INLINE WordBatch operator>>(const WordBatch& a, int count) {
+    return WordBatch(Batch(a.v >> count));
+  }
+};
+
+/// One float per lane.
+template <class Arch>
+struct FloatBatch {
+  using Batch = xsimd::batch<float, Arch>;
+  using Mask = xsimd::batch_bool<float, Arch>;
+  static constexpr int kWidth = static_cast<int>(Batch::size);
+  Batch v;
+
+  FloatBatch() = default;
+  AUVEST_INLINE FloatBatch(float x) : v(x) {}  // implicit: a number is the same in all lanes
+  explicit AUVEST_INLINE FloatBatch(double x) : v(static_cast<float>(x)) {}
+  explicit AUVEST_INLINE FloatBatch(int x) : v(static_cast<float>(x)) {}
+  explicit AUVEST_INLINE FloatBatch(const Batch& x) : v(x) {}
+
+  friend AUVEST_INLINE FloatBatch operator+(const FloatBatch& a, const FloatBatch& b) {
+    return FloatBatch(Batch(a.v + b.v));
+  }
+  friend AUVEST_INLINE FloatBatch operator-(const FloatBatch& a, const FloatBatch& b) {
+    return FloatBatch(Batch(a.v - b.v));
+  }
+  friend AUVEST_INLINE FloatBatch operator*(const FloatBatch& a, const FloatBatch& b) {
+    return FloatBatch(Batch(a.v * b.v));
+  }
+  friend AUVEST_INLINE FloatBatch operator/(const FloatBatch& a, const FloatBatch& b) {
+    return FloatBatch(Batch(a.v / b.v));
+  }
+  AUVEST_INLINE FloatBatch operator-() const { return FloatBatch(Batch(-v)); }
+  friend AUVEST_INLINE Mask operator<(const FloatBatch& a, const FloatBatch& b) {
+    return a.v < b.v;
+  }
+  friend AUVEST_INLINE Mask operator>(const FloatBatch& a, const FloatBatch& b) {
+    return a.v > b.v;
+  }
+  friend AUVEST_INLINE Mask operator<=(const FloatBatch& a, const FloatBatch& b) {
+    return a.v <= b.v;
+  }
+  friend AUVEST_INLINE Mask operator>=(const FloatBatch& a, const FloatBatch& b) {
+    return a.v >= b.v;
+  }
+};
+
+template <class Arch>
+struct ScalarOf<FloatBatch<Arch>> {
+  using Type = float;
+};
+
+template <class Arch>
+AUVEST_INLINE FloatBatch<Arch> select(const xsimd::batch_bool<float, Arch>& condition,
+                                      const FloatBatch<Arch>& yes, const FloatBatch<Arch>& no) {
+  return FloatBatch<Arch>(xsimd::select(condition, yes.v, no.v));
+}
+
+template <class Arch>
+AUVEST_INLINE WordBatch<Arch> to_bits(const FloatBatch<Arch>& x) {
+  return WordBatch<Arch>(xsimd::bitwise_cast<xsimd::batch<uint32_t, Arch>>(x.v));
+}
+template <class Arch>
+AUVEST_INLINE FloatBatch<Arch> from_bits(const WordBatch<Arch>& bits) {
+  return FloatBatch<Arch>(xsimd::bitwise_cast<xsimd::batch<float, Arch>>(bits.v));
+}
+/// The float of an integer below 2^31.
+template <class Arch>
+AUVEST_INLINE FloatBatch<Arch> to_float(const WordBatch<Arch>& word) {
+  return FloatBatch<Arch>(
+      xsimd::to_float(xsimd::bitwise_cast<xsimd::batch<int32_t, Arch>>(word.v)));
+}
+
+template <class Arch>
+AUVEST_INLINE WordBatch<Arch> rotate_left(const WordBatch<Arch>& x, int count) {
+  return (x << count) | (x >> (32 - count));
+}
+
+/// The upper 24 bits of a word as a fraction in [0, 1).
+template <class Value, class Arch>
+AUVEST_INLINE Value fraction_of(const WordBatch<Arch>& word) {
+  return to_float(word >> 8) * Value(5.9604644775390625e-08f);  // 2^-24
+}
+
+namespace detail {
+
+/// The scalar function of each lane.
+template <class Arch, class Function>
+inline FloatBatch<Arch> lane_by_lane(const FloatBatch<Arch>& x, Function function) {
+  alignas(64) float lanes[FloatBatch<Arch>::kWidth];
+  x.v.store_aligned(lanes);
+  for (float& lane : lanes) lane = function(lane);
+  return FloatBatch<Arch>(xsimd::batch<float, Arch>::load_aligned(lanes));
+}
+
+}  // namespace detail
+
+template <class Arch>
+AUVEST_INLINE FloatBatch<Arch> sqrt(const FloatBatch<Arch>& x) {
+  return FloatBatch<Arch>(xsimd::sqrt(x.v));
+}
+template <class Arch>
+AUVEST_INLINE FloatBatch<Arch> absolute(const FloatBatch<Arch>& x) {
+  return from_bits(to_bits(x) & WordBatch<Arch>(0x7fffffffu));
+}
+template <class Arch>
+AUVEST_INLINE Mask<FloatBatch<Arch>> is_finite(const FloatBatch<Arch>& x) {
+  return absolute(x) <= FloatBatch<Arch>(FLT_MAX);
+}
+template <class Arch>
+AUVEST_INLINE FloatBatch<Arch> copy_sign(const FloatBatch<Arch>& x, const FloatBatch<Arch>& y) {
+  return from_bits((to_bits(x) & WordBatch<Arch>(0x7fffffffu)) |
+                   (to_bits(y) & WordBatch<Arch>(0x80000000u)));
+}
+
+template <class Arch>
+AUVEST_INLINE FloatBatch<Arch> exp(const FloatBatch<Arch>& x) {
+  using Value = FloatBatch<Arch>;
+  // Results that are normal numbers.
+  if (!xsimd::all(x >= Value(-87.0f) && x <= Value(88.7228317f))) {
+    return detail::lane_by_lane(x, [](float lane) { return math::exp(lane); });
+  }
+  Value shifted;
+  const Value e = detail::exp_kernel(x, shifted);
+  return from_bits(to_bits(e) + ((to_bits(shifted) + WordBatch<Arch>(0u - 0x4b400000u)) << 23));
+}
+
+template <class Arch>
+AUVEST_INLINE FloatBatch<Arch> log(const FloatBatch<Arch>& x) {
+  using Value = FloatBatch<Arch>;
+  using Word = WordBatch<Arch>;
+  if (!xsimd::all(x >= Value(1.17549435e-38f) && x <= Value(3.40282347e+38f))) {
+    return detail::lane_by_lane(x, [](float lane) { return math::log(lane); });
+  }
+  const Word bits = to_bits(x) + Word(0x3f800000u - 0x3f3504f3u);
+  const Value m = from_bits((bits & Word(0x007fffffu)) + Word(0x3f3504f3u));
+  return detail::log_kernel(m, Value(to_float(bits >> 23) - Value(127.0f)));
+}
+
+template <class Arch>
+AUVEST_INLINE void sincos(const FloatBatch<Arch>& x, FloatBatch<Arch>& s, FloatBatch<Arch>& c) {
+  using Value = FloatBatch<Arch>;
+  using Word = WordBatch<Arch>;
+  const Value size = absolute(x);
+  if (!xsimd::all(size <= Value(96.0f))) {
+    s = detail::lane_by_lane(x, [](float lane) { return math::sin(lane); });
+    c = detail::lane_by_lane(x, [](float lane) { return math::cos(lane); });
+    return;
+  }
+  // Up to pi/4, where the scalar code does not reduce, k is 0 and nothing is subtracted.
+  Value shifted;
+  const Value angle = detail::reduce_near(x, shifted);
+  const Word quarter = to_bits(shifted);
+  const Value sine = detail::sin_kernel(angle);
+  const Value cosine = detail::cos_kernel(angle);
+  const auto odd = to_float(quarter & Word(1u)) > Value(0.0f);
+  const Word sign_s = (quarter & Word(2u)) << 30;
+  const Word sign_c = ((quarter + Word(1u)) & Word(2u)) << 30;
+  s = from_bits(to_bits(select(odd, cosine, sine)) ^ sign_s);
+  c = from_bits(to_bits(select(odd, sine, cosine)) ^ sign_c);
+  s = select(size < Value(2.44140625e-04f), x, s);  // 2^-12
+}
+
+template <class Arch>
+AUVEST_INLINE FloatBatch<Arch> atan2(const FloatBatch<Arch>& y, const FloatBatch<Arch>& x) {
+  using Value = FloatBatch<Arch>;
+  const Value zero(0.0f);
+  const Value size_x = absolute(x);
+  const Value size_y = absolute(y);
+  const Value small = select(size_x < size_y, size_x, size_y);
+  const auto steep = size_y > size_x;
+  const Value large = select(steep, size_y, size_x);
+  const Value ratio = small / large;
+  if (!xsimd::all(ratio >= Value(7.88860905e-31f) && ratio <= Value(1.0f))) {  // 2^-100
+    alignas(64) float lanes_y[Value::kWidth];
+    alignas(64) float lanes_x[Value::kWidth];
+    y.v.store_aligned(lanes_y);
+    x.v.store_aligned(lanes_x);
+    for (int i = 0; i < Value::kWidth; ++i) lanes_y[i] = math::atan2(lanes_y[i], lanes_x[i]);
+    return Value(xsimd::batch<float, Arch>::load_aligned(lanes_y));
+  }
+  const auto left = x < zero;
+  const Value high = select(steep, Value(1.57079637f), select(left, Value(3.14159274f), zero));
+  const Value low =
+      select(steep, Value(-4.37113883e-08f), select(left, Value(-8.74227766e-08f), zero));
+  const Value z = select(steep, select(left, ratio, -ratio), select(left, -ratio, ratio));
+  const Value u = ratio * ratio;
+  const Value bent = low + z * (u * detail::atan_polynomial(u));
+  const Value tail = select(ratio >= Value(2.44140625e-04f), bent, low);  // 2^-12
+  return copy_sign(Value((high + z) + tail), y);
+}
+
+template <class Arch>
+AUVEST_INLINE FloatBatch<Arch> wrap(const FloatBatch<Arch>& a) {
+  using Value = FloatBatch<Arch>;
+  const Value size = absolute(a);
+  if (!xsimd::all(size <= Value(9.424777f))) {
+    return detail::lane_by_lane(a, [](float lane) { return math::wrap(lane); });
+  }
+  const Value turned = (size - Value(6.28318548f)) + Value(1.74845553e-07f);
+  const Value signed_turn = select(a < Value(0.0f), -turned, turned);
+  const Value outside = select(size > Value(pi<float>()), signed_turn, size);  // -pi: +pi
+  return select(a > Value(-pi<float>()) && a <= Value(pi<float>()), a, outside);
+}
+
+}  // namespace math
+}  // namespace auvest
