@@ -51,7 +51,7 @@ void check_against_textbook() {
     REQUIRE(positive);
     Matrix<double, M, O> a = h * l;
     Matrix<double, M, M> used_noise = noise;
-    REQUIRE(auvest::square_root_update(belief, l, slope, a, used_noise, correction) == Status::kOk);
+    REQUIRE(auvest::SquareRootUpdate()(belief, l, slope, a, used_noise, correction) == Status::kOk);
 
     // L becomes a root of P_oo+.
     const Matrix<double, O, O> after = l * l.transpose();
@@ -101,7 +101,7 @@ TEST_CASE("square-root update: float stays positive where P - K S K' does not") 
   noise << 1e-6f;
   Correction<float, 1> correction(Status::kOk);
   correction.innovation << 5;
-  REQUIRE(auvest::square_root_update(belief, root, none, a, noise, correction) == Status::kOk);
+  REQUIRE(auvest::SquareRootUpdate()(belief, root, none, a, noise, correction) == Status::kOk);
   // Closed form: P_00 = R to 1e-12, P_11 = P_11 - P_10^2 / P_00 = 1e6 - 9.801e5 = 19900.
   CHECK(belief.P(0, 0) > 0);
   CHECK(belief.P(0, 0) < 1e-2f);
@@ -129,7 +129,7 @@ TEST_CASE("square-root update: after an outage, float keeps what the fix says of
   noise << float(fix);
   Correction<float, 1> correction(Status::kOk);
   correction.innovation << 30;
-  REQUIRE(auvest::square_root_update(belief, root, slope, a, noise, correction) == Status::kOk);
+  REQUIRE(auvest::SquareRootUpdate()(belief, root, slope, a, noise, correction) == Status::kOk);
   CHECK(belief.P(0, 0) == close_to(fix, 1e-3));
   // P_uo+ = B P_oo+: a relative error, not one of the prior's size.
   CHECK(belief.P(1, 0) == close_to(fix / time, 1e-3));
@@ -155,7 +155,7 @@ TEST_CASE("square-root update: what would overflow is refused and changes nothin
     noise << 1;
     Correction<float, 1> correction(Status::kOk);
     correction.innovation << innovation;
-    CHECK(auvest::square_root_update(belief, root, slope, a, noise, correction) ==
+    CHECK(auvest::SquareRootUpdate()(belief, root, slope, a, noise, correction) ==
           Status::kOverflow);
     CHECK(belief.x(0) == 3e38f);
     CHECK(belief.x(1) == 1);
@@ -174,7 +174,7 @@ TEST_CASE("square-root update: an indefinite noise is refused") {
     Matrix<double, 1, 1> noise;
     noise << bad;
     Correction<double, 1> correction(Status::kOk);
-    CHECK(auvest::square_root_update(belief, one, one, a, noise, correction) ==
+    CHECK(auvest::SquareRootUpdate()(belief, one, one, a, noise, correction) ==
           Status::kNotPositiveDefinite);
   }
   Belief<double, 2> pair;
@@ -186,7 +186,7 @@ TEST_CASE("square-root update: an indefinite noise is refused") {
   indefinite << 1, 2, 2, 1;
   Correction<double, 2> correction(Status::kOk);
   Matrix<double, 2, 2> unseen = Matrix<double, 2, 2>::Zero();
-  CHECK(auvest::square_root_update(pair, root, none, unseen, indefinite, correction) ==
+  CHECK(auvest::SquareRootUpdate()(pair, root, none, unseen, indefinite, correction) ==
         Status::kNotPositiveDefinite);
 }
 

@@ -75,7 +75,7 @@ class GaussianFilter {
     static_assert(Model::kStates == kStates, "the measurement model is for another state");
     constexpr int kSize = Model::kSize;
     Correction<Scalar, kSize> correction(Status::kOk);
-    correction.status = correct(z, model, correction);
+    correction.status = correct(z, model, SquareRootUpdate(), correction);
     if (correction.status != Status::kOk) correction.clear(correction.status);
     return correction;
   }
@@ -96,12 +96,11 @@ class GaussianFilter {
   bool initialised() const { return initialised_; }
   const Process& process() const { return process_; }
 
- private:
-  const Derived& derived() const { return static_cast<const Derived&>(*this); }
-
-  template <class Model>
+ protected:
+  /// Linearises, then lets `rule` move the belief, as SquareRootUpdate does.
+  template <class Model, class Rule, class Report>
   AUVEST_INLINE Status correct(const typename Model::Measurement& z, const Model& model,
-                               Correction<Scalar, Model::kSize>& correction) {
+                               Rule&& rule, Report& correction) {
     if (!initialised_) return Status::kNotInitialised;
     if (!math::all_finite(z)) return Status::kNotFinite;
 
@@ -114,9 +113,11 @@ class GaussianFilter {
     Matrix<Scalar, kSize, kObserved> a;
     Matrix<Scalar, kSize, kSize> noise;
     const Status status = linearise(z, model, root, correction, a, noise);
-    return status == Status::kOk ? square_root_update(belief_, root, slope, a, noise, correction)
-                                 : status;
+    return status == Status::kOk ? rule(belief_, root, slope, a, noise, correction) : status;
   }
+
+ private:
+  const Derived& derived() const { return static_cast<const Derived&>(*this); }
 
   template <class Model>
   AUVEST_OUTLINE AUVEST_INLINE Status

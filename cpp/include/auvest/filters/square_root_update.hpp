@@ -22,7 +22,7 @@
 // The NIS comes out as a sum of squares, sum r^2 / s, which equals innovation' S^-1 innovation.
 //
 // A particle filter with one Gaussian per particle takes the same steps in the lanes of a vector
-// register: all but square_root_update() is written over `Value`, a number or a batch of numbers
+// register: all but SquareRootUpdate is written over `Value`, a number or a batch of numbers
 // (select.hpp), and answers with a mask.
 #pragma once
 
@@ -209,21 +209,23 @@ AUVEST_OUTLINE AUVEST_INLINE math::Mask<Value> move_belief(Belief<Value, N>& bel
   return finite;
 }
 
-/// Updates `belief`. `root` is L and `slope` is B of math::factor_leading; `a` is A, and `noise` is
-/// E (lower triangle); all but `slope` are used up. Fills S and nis from `correction.innovation`.
-/// Returns kNotPositiveDefinite if E is not positive definite, kOverflow if the result would not be
-/// finite, and has not touched the belief then.
-template <int M, int O, int U, class Scalar, int N>
-AUVEST_INLINE Status square_root_update(Belief<Scalar, N>& belief, Matrix<Scalar, O, O>& root,
-                                        const Matrix<Scalar, U, O>& slope, Matrix<Scalar, M, O>& a,
-                                        Matrix<Scalar, M, M>& noise,
-                                        Correction<Scalar, M>& correction) {
-  innovation_covariance(a, noise, correction.S);
-  if (!math::ldlt(noise)) return Status::kNotPositiveDefinite;
-  Posterior<Scalar, O> posterior;
-  if (!potter(a, noise, correction.innovation, posterior)) return Status::kOverflow;
-  correction.nis = posterior.nis;
-  return move_belief(belief, root, slope, posterior) ? Status::kOk : Status::kOverflow;
-}
+/// The update as a rule of GaussianFilter. Moves `belief`. `root` is L and `slope` is B of
+/// math::factor_leading; `a` is A, and `noise` is E (lower triangle); all but `slope` are used up.
+/// Fills S and nis from `correction.innovation`. Returns kNotPositiveDefinite if E is not positive
+/// definite, kOverflow if the result would not be finite, and has not touched the belief then.
+struct SquareRootUpdate {
+  template <int M, int O, int U, class Scalar, int N>
+  AUVEST_INLINE Status operator()(Belief<Scalar, N>& belief, Matrix<Scalar, O, O>& root,
+                                  const Matrix<Scalar, U, O>& slope, Matrix<Scalar, M, O>& a,
+                                  Matrix<Scalar, M, M>& noise,
+                                  Correction<Scalar, M>& correction) const {
+    innovation_covariance(a, noise, correction.S);
+    if (!math::ldlt(noise)) return Status::kNotPositiveDefinite;
+    Posterior<Scalar, O> posterior;
+    if (!potter(a, noise, correction.innovation, posterior)) return Status::kOverflow;
+    correction.nis = posterior.nis;
+    return move_belief(belief, root, slope, posterior) ? Status::kOk : Status::kOverflow;
+  }
+};
 
 }  // namespace auvest
