@@ -10,8 +10,11 @@
 #include "auvest/filters/ukf.hpp"
 #include "auvest/math/random.hpp"
 #include "auvest/models/constant_acceleration.hpp"
+#include "auvest/models/dead_reckoning.hpp"
+#include "auvest/models/leader_range.hpp"
 #include "auvest/models/linear.hpp"
 #include "auvest/models/piecewise_acceleration.hpp"
+#include "auvest/models/odometry.hpp"
 #include "auvest/models/range_bearing.hpp"
 
 namespace {
@@ -140,6 +143,23 @@ void check_convergence(Filter filter, const Model& model, const Vector<double, 6
   CHECK(std::fabs(filter.x()(1) - truth(1)) < 1e-3);
 }
 
+/// `model` driven: 2 m/s (m) ahead, 0.5 to the side, at 0.7 rad.
+template <class Model>
+Model driven(Model model) {
+  model.input << 2, 0.5, 0.7;
+  return model;
+}
+
+template <int N>
+auvest::LeaderRange<double, N> leader(double x_m, double y_m) {
+  typename auvest::LeaderRange<double, N>::Params p;
+  p.leader_x_m = x_m;
+  p.leader_y_m = y_m;
+  p.sigma_range_m = 3;
+  p.sigma_leader_m = 4;
+  return auvest::LeaderRange<double, N>(p);
+}
+
 auvest::RangeBearing<double, 6> sonar() {
   auvest::RangeBearing<double, 6>::Params p;
   p.station_x_m = 0.2;
@@ -152,6 +172,11 @@ TEST_CASE("process models") {
   check_process(auvest::PiecewiseAcceleration<double>(), 0.7);
   check_process(auvest::ExactAcceleration<double>(), 0.5);
   check_process(auvest::ExactAcceleration<double>(), 30);
+  check_process(driven(auvest::DeadReckoning<double>()), 0.5);
+  check_process(driven(auvest::DeadReckoning<double, true>()), 0.5);
+  check_process(driven(auvest::DeadReckoning<double, false, true>()), 0.5);
+  check_process(driven(auvest::DeadReckoning<double, true, true>()), 0.5);
+  check_process(driven(auvest::Odometry<double>()), 0.5);
   Matrix<double, 3, 3> phi;
   phi << 1, 0.5, 0, 0, 1, 0.5, 0.1, 0, 0.9;
   check_process(auvest::LinearProcess<double, 3>(phi, Matrix<double, 3, 3>::Identity()), 1);
@@ -159,6 +184,7 @@ TEST_CASE("process models") {
 
 TEST_CASE("measurement models") {
   check_measurement(sonar(), 100);
+  check_measurement(leader<4>(30, -20), 100);
   Matrix<double, 2, 3> h;
   h << 1, -1, 0.5, 0, 2, 1;
   check_measurement(auvest::LinearMeasurement<double, 5, 2, 3>(h, Matrix<double, 2, 2>::Identity()),
@@ -356,6 +382,97 @@ TEST_CASE("range and bearing: covariance of the position form, by Monte Carlo") 
   }
 }
 
+TEST_CASE("dead reckoning: Eq. (1) by hand, and what the optional states mean") {
+  const double pi = auvest::math::pi<double>();
+  // Heading east (pi/2 from north): forward is +y (east), starboard is -x (south).
+  auvest::DeadReckoning<double> plain;
+  plain.input << 1.5, 0.25, pi / 2;
+  const Vector<double, 2> next = plain.f(Vector<double, 2>(10, 20), 2);
+  CHECK(next(0) == close_to(10 - 2 * 0.25, 1e-14));
+  CHECK(next(1) == close_to(20 + 2 * 1.5, 1e-14));
+  // The bias is added to the heading, the scale multiplies the speed: [x, y, bias, scale].
+  auvest::DeadReckoning<double, true, true> full;
+  full.input << 1.2, 0.2, pi / 2 - 0.3;
+  const auto corrected = full.f(Vector<double, 4>(10, 20, 0.3, 0.25), 2);
+  CHECK(corrected(0) == close_to(10 - 2 * 0.25, 1e-14));
+  CHECK(corrected(1) == close_to(20 + 2 * 1.5, 1e-14));
+  CHECK(corrected(2) == 0.3);
+  CHECK(corrected(3) == 0.25);
+}
+
+TEST_CASE("dead reckoning: Q is the covariance of Eq. (1) with noisy input, by Monte Carlo") {
+  auvest::DeadReckoning<double>::Params p;
+  p.sigma_forward = 0.1;
+  p.sigma_starboard = 0.05;
+  p.sigma_heading = 0.02;
+  auvest::DeadReckoning<double> model(p);
+  const Vector<double, 3> input(2, 0.5, 0.7);
+  model.input = input;
+  const Matrix<double, 2, 2> q = model.Q(1);
+  const Vector<double, 2> mean = model.f(Vector<double, 2>(0, 0), 1);
+  Matrix<double, 2, 2> sum = Matrix<double, 2, 2>::Zero();
+  Random random(5);
+  const int n = 200000;
+  for (int k = 0; k < n; ++k) {
+    model.input = input;
+    model.input(0) += p.sigma_forward * random.normal<double>();
+    model.input(1) += p.sigma_starboard * random.normal<double>();
+    model.input(2) += p.sigma_heading * random.normal<double>();
+    const Vector<double, 2> error = model.f(Vector<double, 2>(0, 0), 1) - mean;
+    sum += error * error.transpose() / n;
+  }
+  // Statistical error of a variance: sqrt(2 / n) = 0.3 %; second order in the heading: 0.04 %.
+  CHECK((sum - q).cwiseAbs().maxCoeff() < 0.015 * q.trace());
+  CHECK(std::fabs(q(1, 0)) > 0.2 * q.trace());  // the signs are seen
+}
+
+TEST_CASE("odometry: increments compose") {
+  // A square of four equal steps, each followed by a quarter turn, ends where it began.
+  auvest::Odometry<double> model;
+  model.input << 3, 1, auvest::math::pi<double>() / 2;
+  const Vector<double, 3> start(5, 6, 0.4);
+  Vector<double, 3> x = start;
+  for (int k = 0; k < 4; ++k) {
+    x = model.f(x, 1);
+    if (k == 0) {
+      CHECK(x(0) == close_to(5 + 3 * std::cos(0.4) - std::sin(0.4), 1e-14));
+      CHECK(x(1) == close_to(6 + 3 * std::sin(0.4) + std::cos(0.4), 1e-14));
+    }
+  }
+  CHECK(x(0) == close_to(5, 1e-14));
+  CHECK(x(1) == close_to(6, 1e-14));
+  CHECK(x(2) == close_to(0.4 + 2 * auvest::math::pi<double>(), 1e-14));
+  // 5 % of sqrt(10) m, and 0.1 m/sqrt(s) for 4 s.
+  CHECK(model.Q(4)(0, 0) == close_to(0.0025 * 10 + 0.01 * 4, 1e-14));
+}
+
+TEST_CASE("leader range: the leader's uncertainty adds to R; at the leader nothing moves") {
+  const auto model = leader<2>(7, 8);
+  CHECK(model.R()(0, 0) == 25);
+  auvest::Ekf<auvest::DeadReckoning<double>> ekf{auvest::DeadReckoning<double>()};
+  const Vector<double, 2> there(7, 8);
+  REQUIRE(ekf.reset(there, Matrix<double, 2, 2>::Identity()) == auvest::Status::kOk);
+  CHECK(ekf.update(Vector<double, 1>(2.0), model).status == auvest::Status::kOk);
+  CHECK(ekf.x() == there);
+  CHECK(ekf.P()(0, 0) == 1);
+}
+
+TEST_CASE("processes with an input: predict takes it, and refuses what is not finite") {
+  auvest::Ekf<auvest::DeadReckoning<double>> filter{auvest::DeadReckoning<double>()};
+  REQUIRE(filter.reset(Vector<double, 2>(1, 2), Matrix<double, 2, 2>::Identity()) ==
+          auvest::Status::kOk);
+  const Vector<double, 3> input(2, 0, 0);
+  CHECK(filter.predict(0.5, input) == auvest::Status::kOk);
+  CHECK(filter.x()(0) == 2);
+  CHECK(filter.predict(0.5) == auvest::Status::kOk);  // the input stands
+  CHECK(filter.x()(0) == 3);
+  const auto before = filter.belief();
+  CHECK(filter.predict(0.5, Vector<double, 3>(2, std::nan(""), 0)) == auvest::Status::kNotFinite);
+  CHECK(filter.predict(-1, Vector<double, 3>(9, 9, 9)) == auvest::Status::kTimeBackwards);
+  CHECK(filter.process().input == input);
+  CHECK(filter.x() == before.x);
+}
+
 TEST_CASE("models refuse bad parameters") {
   const double nan = std::nan("");
   const auto range_bearing = [](double sx, double sr, double sb, double near) {
@@ -373,6 +490,18 @@ TEST_CASE("models refuse bad parameters") {
   CHECK(range_bearing(0, 1, nan, 0) == auvest::Status::kBadParameter);
   CHECK(range_bearing(0, 1, 0, 0) == auvest::Status::kBadParameter);
   CHECK(range_bearing(0, 1, 1, -1) == auvest::Status::kBadParameter);
+  for (const double bad : {-1.0, nan}) {
+    auvest::DeadReckoning<double>::Params reckoning;
+    reckoning.sigma_heading = bad;
+    CHECK(auvest::DeadReckoning<double>(reckoning).check() == auvest::Status::kBadParameter);
+    auvest::Odometry<double>::Params odometry;
+    odometry.sigma_drift = bad;
+    CHECK(auvest::Odometry<double>(odometry).check() == auvest::Status::kBadParameter);
+    auvest::LeaderRange<double, 2>::Params range;
+    range.sigma_leader_m = bad;
+    CHECK(auvest::LeaderRange<double, 2>(range).check() == auvest::Status::kBadParameter);
+  }
+  CHECK(leader<2>(nan, 0).check() == auvest::Status::kBadParameter);
   auvest::AccelerationNoise<double> noise;
   noise.velocity = -1;
   CHECK(auvest::ExactAcceleration<double>(noise).check() == auvest::Status::kBadParameter);

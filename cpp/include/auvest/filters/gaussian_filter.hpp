@@ -68,6 +68,17 @@ class GaussianFilter {
     return status;
   }
 
+  /// The same for a process that has an input, which is `input` during these dt seconds.
+  template <class Input>
+  Status predict(Scalar dt, const Input& input) {
+    if (!math::all_finite(input)) return Status::kNotFinite;
+    const Input before = process_.input;
+    process_.input = input;
+    const Status status = predict(dt);
+    if (status != Status::kOk) process_.input = before;
+    return status;
+  }
+
   /// Corrects the belief by the measurement z of a sensor described by `model`.
   template <class Model>
   AUVEST_OUTLINE Correction<Scalar, Model::kSize> update(const typename Model::Measurement& z,

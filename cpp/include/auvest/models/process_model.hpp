@@ -14,6 +14,8 @@
 //     kClosedForm            true if it does
 //     propagate(belief, dt)  x <- f, P <- Phi P Phi' + Q in place, from the structure of Phi
 //     kLinear                true if f is linear in x: the UKF then calls propagate, which is exact
+//     Input, input           type and value of what drives the process (a Vector), for
+//                            predict(dt, input)
 //     position_variance(...) trace of the position block of P after dt (interval policies)
 #pragma once
 
