@@ -457,6 +457,35 @@ TEST_CASE("leader range: the leader's uncertainty adds to R; at the leader nothi
   CHECK(ekf.P()(0, 0) == 1);
 }
 
+TEST_CASE("leader range: second-order terms against Monte Carlo") {
+  // 40 m across and 1 m along the line of sight, at 300 m: mean and variance of h(x) - h(mean).
+  const auto model = leader<2>(0, 0);
+  const double c = std::cos(0.7), s = std::sin(0.7);
+  const Vector<double, 2> mean(300 * c, 300 * s);
+  Matrix<double, 2, 2> p;
+  p << c * c + 1600 * s * s, (1 - 1600) * c * s, (1 - 1600) * c * s, s * s + 1600 * c * c;
+  Matrix<double, 2, 2> root;
+  Matrix<double, 1, 2> none;
+  REQUIRE(auvest::math::factor_leading(p, root, none));
+  Vector<double, 1> innovation(0.0);
+  Matrix<double, 1, 1> noise(0.0);
+  model.second_order(model.about(mean), root, innovation, noise);
+  CHECK(innovation(0) == close_to(-1600 / 600.0, 1e-12));
+  CHECK(noise(0, 0) == close_to(1600.0 * 1600 / (2 * 300.0 * 300), 1e-12));
+  Random random(3);
+  const int n = 200000;
+  double sum = 0, square = 0;
+  for (int k = 0; k < n; ++k) {
+    const Vector<double, 2> y(random.normal<double>(), random.normal<double>());
+    const double d = model.h(mean + root * y)(0) - 300;
+    sum += d / n;
+    square += d * d / n;
+  }
+  // The fourth order takes 3/4 (40 / 300)^2 = 1.3 % off the mean and 5 times that off the variance.
+  CHECK(sum == close_to(-innovation(0), 0.025));
+  CHECK(square - sum * sum == close_to(noise(0, 0) + 1, 0.1));
+}
+
 TEST_CASE("processes with an input: predict takes it, and refuses what is not finite") {
   auvest::Ekf<auvest::DeadReckoning<double>> filter{auvest::DeadReckoning<double>()};
   REQUIRE(filter.reset(Vector<double, 2>(1, 2), Matrix<double, 2, 2>::Identity()) ==

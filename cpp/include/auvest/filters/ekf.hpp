@@ -31,6 +31,7 @@ class Ekf : public GaussianFilter<Ekf<Process>, Process> {
     innovation = model.residual(z, point.value());
     project(point.H(), root, a);
     noise = model.R();
+    model.second_order(point, root, innovation, noise);
     return Status::kOk;
   }
 };

@@ -6,6 +6,11 @@
 // Differs from Eq. (4): the print repeats one component of x; it means components 1 and 2. Differs
 // from Eq. (5): the leader's position is uncertain too, alike in all directions, and so the range.
 //
+// Seen across the line of sight, at distance r, a circle bends: with v = n' P n, n normal to it,
+// the second-order term of h has the mean v / (2 r) and the variance v^2 / (2 r^2). Both are
+// nothing in ordinary tracking; after a recovery, where sqrt(v) is not small beside r, a filter
+// without them is soon sure of a wrong position.
+//
 // There is one model per message, any number of leaders: the position is the one the leader had
 // when the range was taken. At the leader itself the range has no slope and moves nothing.
 #pragma once
@@ -22,7 +27,9 @@ struct LeaderRange : MeasurementModel<LeaderRange<Scalar_, N>, Scalar_, N, 1, 2>
   using typename Base::Jacobian;
   using typename Base::Measurement;
   using typename Base::Noise;
+  using typename Base::ObservedState;
   using typename Base::State;
+  static constexpr bool kClosedForm = true;
 
   struct Params {
     Scalar leader_x_m = Scalar(0);
@@ -35,21 +42,63 @@ struct LeaderRange : MeasurementModel<LeaderRange<Scalar_, N>, Scalar_, N, 1, 2>
 
   explicit LeaderRange(const Params& p = Params()) : params(p) {}
 
-  /// Eq. (4) without noise.
-  Measurement h(const State& x) const {
-    Measurement z;
-    z(0) = distance(x);
-    return z;
+  struct Expansion {
+    Scalar range;
+    Scalar ux, uy;  // unit vector from the leader; 0 at the leader
+    Measurement centre;
+
+    const Measurement& value() const { return centre; }
+
+    Jacobian H() const {
+      Jacobian jacobian;
+      jacobian(0, 0) = ux;
+      jacobian(0, 1) = uy;
+      return jacobian;
+    }
+
+    /// In closed form, as derived in range_bearing.hpp.
+    AUVEST_INLINE void deviations(const ObservedState& e, Measurement& sum,
+                                  Measurement& difference) const {
+      using math::sqrt;
+      const Scalar one = Scalar(1);
+      const Scalar scale = range > Scalar(1e-15) ? one / range : Scalar(0);
+      const Scalar p = (ux * e(0) + uy * e(1)) * scale;
+      const Scalar q = (ux * e(1) - uy * e(0)) * scale;
+      const Scalar qq = q * q;
+      const Scalar uu = p * p + qq;
+      if (uu < Scalar(0.25) * math::machine_epsilon<Scalar>()) {
+        sum(0) = range * qq;
+        difference(0) = (range + range) * p;
+        return;
+      }
+      const Scalar w = one - uu;
+      const Scalar a_plus = sqrt((one + p) * (one + p) + qq);
+      const Scalar a_minus = sqrt((one - p) * (one - p) + qq);
+      const Scalar a_sum = a_plus + a_minus;
+      const Scalar product = a_plus * a_minus;
+      const bool inside = w > Scalar(0);
+      const Scalar g = inside ? Scalar(4) * qq / (product + w) : product - w;
+      sum(0) = (range + range) * g / (a_sum + Scalar(2));
+      difference(0) = Scalar(4) * range * p / a_sum;
+    }
+  };
+
+  AUVEST_INLINE Expansion about(const State& x) const {
+    using math::sqrt;
+    const Scalar dx = x(0) - params.leader_x_m;
+    const Scalar dy = x(1) - params.leader_y_m;
+    Expansion point;
+    point.range = sqrt(dx * dx + dy * dy);
+    point.centre(0) = point.range;
+    const Scalar inverse = point.range > Scalar(1e-15) ? Scalar(1) / point.range : Scalar(0);
+    point.ux = dx * inverse;
+    point.uy = dy * inverse;
+    return point;
   }
 
-  Jacobian H(const State& x) const {
-    const Scalar range = distance(x);
-    const bool apart = range > Scalar(1e-15);
-    Jacobian jacobian;
-    jacobian(0, 0) = apart ? (x(0) - params.leader_x_m) / range : Scalar(0);
-    jacobian(0, 1) = apart ? (x(1) - params.leader_y_m) / range : Scalar(0);
-    return jacobian;
-  }
+  /// Eq. (4) without noise.
+  Measurement h(const State& x) const { return about(x).centre; }
+  Jacobian H(const State& x) const { return about(x).H(); }
 
   /// Eq. (5).
   Noise R() const {
@@ -59,19 +108,21 @@ struct LeaderRange : MeasurementModel<LeaderRange<Scalar_, N>, Scalar_, N, 1, 2>
     return noise;
   }
 
+  void second_order(const Expansion& point, const Matrix<Scalar, 2, 2>& root,
+                    Measurement& innovation, Noise& noise) const {
+    if (!(point.range > Scalar(1e-15))) return;
+    const Scalar first = point.ux * root(1, 0) - point.uy * root(0, 0);  // L' n, n = (-uy, ux)
+    const Scalar second = point.ux * root(1, 1);
+    const Scalar bend = (first * first + second * second) / (point.range + point.range);
+    innovation(0) = innovation(0) - bend;
+    noise(0, 0) = noise(0, 0) + (bend + bend) * bend;
+  }
+
   Status check() const {
     const bool valid = math::is_finite(params.leader_x_m) && math::is_finite(params.leader_y_m) &&
                        math::is_positive(params.sigma_range_m) &&
                        math::is_nonnegative(params.sigma_leader_m);
     return valid ? Status::kOk : Status::kBadParameter;
-  }
-
- private:
-  Scalar distance(const State& x) const {
-    using math::sqrt;
-    const Scalar dx = x(0) - params.leader_x_m;
-    const Scalar dy = x(1) - params.leader_y_m;
-    return sqrt(dx * dx + dy * dy);
   }
 };
 

@@ -15,6 +15,10 @@
 //     residual(z, predicted)      z - predicted, wrapped where a component is an angle
 //     about(x)                    an expansion with deviations in closed form
 //     kClosedForm                 true if it does
+//     second_order(point, root, innovation, noise)
+//                                 for the EKF: takes the mean of the second-order term of h, over
+//                                 the belief with P_oo = root root', off the innovation and adds
+//                                 its covariance to `noise`
 //     near_field(point, P, z, innovation, noise)
 //                                 for a model with M = Observed: true where h is useless at the
 //                                 scale of the belief; the filter then takes the measurement as one
@@ -78,6 +82,10 @@ struct MeasurementModel {
     for (int i = 0; i < M; ++i) difference(i) = z(i) - predicted(i);
     return difference;
   }
+
+  template <class Point>
+  void second_order(const Point&, const Matrix<Scalar, Observed, Observed>&, Measurement&,
+                    Noise&) const {}
 
   template <class Point>
   bool near_field(const Point&, const Matrix<Scalar, N, N>&, const Measurement&, Measurement&,

@@ -2,16 +2,16 @@
 //
 // A kernel that rejects beyond k1 sigma keeps rejecting when the prior itself is off by more than
 // that: P does not know, and nothing tells it. The M-estimation EKF paper does not treat the case.
-// Here a counter goes up with each rejection and down with each acceptance. At n, and at every
+// Here a count goes up by 2 with each rejection and down by 1 with each acceptance, so that it also
+// gets there where every second leader happens to agree with the wrong prior. At 2 n, and at every
 // further rejection while it stands there, the position variance grows by
 //
-//     q = max over the rejected components of (r^2 - S) / |h|^2
+//     q = max over what was rejected since the last time of (r^2 - S) / |h|^2
 //
 // with h the position part of that component's row of H, so that the same innovation would now
 // stand at one sigma. The measurement that completes the streak stays rejected: where the streak
 // was n outliers by chance, the next good measurement finds a wide belief and puts it right, and
-// nothing but the prior's knowledge is lost. The counter goes down by steps, not to zero, so that
-// an update that lands between two leaders is followed by another widening at once if it must.
+// nothing but the prior's knowledge is lost.
 #pragma once
 
 #include <cstdint>
@@ -25,15 +25,19 @@ struct RejectionStreak {
   using Scalar = Scalar_;
 
   struct Params {
-    std::uint8_t rejections = 4;  ///< n >= 1
+    std::uint8_t rejections = 6;  ///< n, 1..100
   };
 
   Params params;
-  std::uint8_t count;  ///< 0..n
+  std::uint8_t count;  ///< 0..2 n
+  Scalar variance;     ///< q as the rejections so far ask for it [m^2], 0 if count is
 
-  explicit RejectionStreak(const Params& p = Params()) : params(p), count(0) {}
+  explicit RejectionStreak(const Params& p = Params()) : params(p), count(0), variance(Scalar(0)) {}
 
-  void restart() { count = 0; }
+  void restart() {
+    count = 0;
+    variance = Scalar(0);
+  }
 
   /// The first two states (or the only one seen) are the position.
   template <int M, int O, int N>
@@ -43,13 +47,10 @@ struct RejectionStreak {
     for (int m = 0; m < M; ++m) rejected = rejected || !(correction.weight(m) > Scalar(0));
     if (!rejected) {
       if (count > 0) --count;
+      if (count == 0) variance = Scalar(0);
       return false;
     }
-    if (count < params.rejections) ++count;
-    if (count < params.rejections) return false;
-
     constexpr int kPosition = O < 2 ? O : 2;
-    Scalar q = Scalar(0);
     for (int m = 0; m < M; ++m) {
       if (correction.weight(m) > Scalar(0)) continue;
       Vector<Scalar, O> h;  // h L = a
@@ -61,15 +62,20 @@ struct RejectionStreak {
       const Scalar missing =
           correction.innovation(m) * correction.innovation(m) - correction.S(m, m);
       const Scalar needed = missing / math::dot(h.data(), h.data(), kPosition);
-      if (math::is_finite(needed) && needed > q) q = needed;
+      if (math::is_finite(needed) && needed > variance) variance = needed;
     }
-    for (int i = 0; i < kPosition; ++i) belief.P(i, i) = belief.P(i, i) + q;
-    return q > Scalar(0);
+    const int full = 2 * params.rejections;
+    count = static_cast<std::uint8_t>(count + 2 < full ? count + 2 : full);
+    if (count < full) return false;
+    for (int i = 0; i < kPosition; ++i) belief.P(i, i) = belief.P(i, i) + variance;
+    variance = Scalar(0);
+    return true;
   }
 
   Status check() const {
-    return params.rejections > 0 && count <= params.rejections ? Status::kOk
-                                                               : Status::kBadParameter;
+    const bool valid = params.rejections >= 1 && params.rejections <= 100 &&
+                       count <= 2 * params.rejections && math::is_nonnegative(variance);
+    return valid ? Status::kOk : Status::kBadParameter;
   }
 };
 
