@@ -4,6 +4,7 @@
 #include <doctest/doctest.h>
 
 #include <vector>
+#include <initializer_list>
 
 #include "auvest/auvest.hpp"
 
@@ -104,6 +105,59 @@ TEST_CASE("explicit scalar: the generic paths too") {
   const auto a = run_generic<ExplicitDouble>();
   const auto b = run_generic<double>();
   for (int i = 0; i < 2; ++i) CHECK(double(a(i)) == b(i));
+}
+
+/// The robust filters on what they are made for, with outliers, a lock-out and its recovery.
+template <class Scalar, template <class> class Filter, class Kernel>
+auvest::Vector<Scalar, 4> run_robust(auvest::Residual residual) {
+  using Process = auvest::DeadReckoning<Scalar, true, true>;
+  using Rule = auvest::RobustUpdate<Kernel, auvest::RejectionStreak<Scalar>>;
+  using Range = auvest::LeaderRange<Scalar, 4>;
+  Rule rule;
+  rule.params.residual = residual;
+  auvest::Robust<Filter<Process>, Rule> filter(Filter<Process>(Process()), rule);
+  auvest::Vector<Scalar, 4> x;
+  auvest::Matrix<Scalar, 4, 4> p;
+  for (int i = 0; i < 4; ++i) {
+    x(i) = Scalar(0);
+    for (int j = 0; j < 4; ++j) p(i, j) = Scalar(i == j ? (i < 2 ? 1.0 : 1e-4) : 0.0);
+  }
+  REQUIRE(filter.reset(x, p) == auvest::Status::kOk);
+  int recoveries = 0;
+  for (int k = 0; k < 60; ++k) {
+    auvest::Vector<Scalar, 3> input;
+    input(0) = Scalar(1.5);
+    input(1) = Scalar(0.1);
+    input(2) = Scalar(0.02 * k);
+    REQUIRE(filter.predict(Scalar(5), input) == auvest::Status::kOk);
+    typename Range::Params params;
+    params.leader_x_m = Scalar(k % 2 == 0 ? 300 : -100);
+    params.leader_y_m = Scalar(k % 2 == 0 ? 0 : 250);
+    params.sigma_leader_m = Scalar(0.5);
+    auvest::Vector<Scalar, 1> z;
+    z(0) = Scalar(k % 2 == 0 ? 300 : 270);
+    if (k > 20) z(0) = z(0) + Scalar(80);
+    const auto correction = filter.update(z, Range(params));
+    REQUIRE(correction.status == auvest::Status::kOk);
+    recoveries += correction.recovered ? 1 : 0;
+  }
+  CHECK((recoveries > 0) == (Kernel().weight(Scalar(1e9)) < Scalar(1e-10)));  // Huber never rejects
+  return filter.x();
+}
+
+template <template <class> class Filter, template <class> class Kernel>
+void check_robust(auvest::Residual residual) {
+  const auto a = run_robust<ExplicitDouble, Filter, Kernel<ExplicitDouble>>(residual);
+  const auto b = run_robust<double, Filter, Kernel<double>>(residual);
+  for (int i = 0; i < 4; ++i) CHECK(double(a(i)) == b(i));
+}
+
+TEST_CASE("explicit scalar: the robust filters too") {
+  for (const auto residual : {auvest::Residual::kInnovation, auvest::Residual::kPostFit}) {
+    check_robust<auvest::Ekf, auvest::Igg>(residual);
+    check_robust<auvest::Ekf, auvest::Huber>(residual);
+    check_robust<auvest::Ukf, auvest::Hampel>(residual);
+  }
 }
 
 TEST_CASE("explicit scalar: same bits as double") {
