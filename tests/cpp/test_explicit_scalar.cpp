@@ -3,8 +3,8 @@
 
 #include <doctest/doctest.h>
 
-#include <vector>
 #include <initializer_list>
+#include <vector>
 
 #include "auvest/auvest.hpp"
 
@@ -110,7 +110,7 @@ TEST_CASE("explicit scalar: the generic paths too") {
 /// The robust filters on what they are made for, with outliers, a lock-out and its recovery.
 template <class Scalar, template <class> class Filter, class Kernel>
 auvest::Vector<Scalar, 4> run_robust(auvest::Residual residual) {
-  using Process = auvest::DeadReckoning<Scalar, true, true>;
+  using Process = auvest::SpeedHeading<Scalar, true, true>;
   using Rule = auvest::RobustUpdate<Kernel, auvest::RejectionStreak<Scalar>>;
   using Range = auvest::LeaderRange<Scalar, 4>;
   Rule rule;

@@ -10,12 +10,12 @@
 #include "auvest/filters/ukf.hpp"
 #include "auvest/math/random.hpp"
 #include "auvest/models/constant_acceleration.hpp"
-#include "auvest/models/dead_reckoning.hpp"
 #include "auvest/models/leader_range.hpp"
 #include "auvest/models/linear.hpp"
-#include "auvest/models/piecewise_acceleration.hpp"
 #include "auvest/models/odometry.hpp"
+#include "auvest/models/piecewise_acceleration.hpp"
 #include "auvest/models/range_bearing.hpp"
+#include "auvest/models/speed_heading.hpp"
 
 namespace {
 
@@ -172,10 +172,10 @@ TEST_CASE("process models") {
   check_process(auvest::PiecewiseAcceleration<double>(), 0.7);
   check_process(auvest::ExactAcceleration<double>(), 0.5);
   check_process(auvest::ExactAcceleration<double>(), 30);
-  check_process(driven(auvest::DeadReckoning<double>()), 0.5);
-  check_process(driven(auvest::DeadReckoning<double, true>()), 0.5);
-  check_process(driven(auvest::DeadReckoning<double, false, true>()), 0.5);
-  check_process(driven(auvest::DeadReckoning<double, true, true>()), 0.5);
+  check_process(driven(auvest::SpeedHeading<double>()), 0.5);
+  check_process(driven(auvest::SpeedHeading<double, true>()), 0.5);
+  check_process(driven(auvest::SpeedHeading<double, false, true>()), 0.5);
+  check_process(driven(auvest::SpeedHeading<double, true, true>()), 0.5);
   check_process(driven(auvest::Odometry<double>()), 0.5);
   Matrix<double, 3, 3> phi;
   phi << 1, 0.5, 0, 0, 1, 0.5, 0.1, 0, 0.9;
@@ -385,13 +385,13 @@ TEST_CASE("range and bearing: covariance of the position form, by Monte Carlo") 
 TEST_CASE("dead reckoning: Eq. (1) by hand, and what the optional states mean") {
   const double pi = auvest::math::pi<double>();
   // Heading east (pi/2 from north): forward is +y (east), starboard is -x (south).
-  auvest::DeadReckoning<double> plain;
+  auvest::SpeedHeading<double> plain;
   plain.input << 1.5, 0.25, pi / 2;
   const Vector<double, 2> next = plain.f(Vector<double, 2>(10, 20), 2);
   CHECK(next(0) == close_to(10 - 2 * 0.25, 1e-14));
   CHECK(next(1) == close_to(20 + 2 * 1.5, 1e-14));
   // The bias is added to the heading, the scale multiplies the speed: [x, y, bias, scale].
-  auvest::DeadReckoning<double, true, true> full;
+  auvest::SpeedHeading<double, true, true> full;
   full.input << 1.2, 0.2, pi / 2 - 0.3;
   const auto corrected = full.f(Vector<double, 4>(10, 20, 0.3, 0.25), 2);
   CHECK(corrected(0) == close_to(10 - 2 * 0.25, 1e-14));
@@ -401,11 +401,11 @@ TEST_CASE("dead reckoning: Eq. (1) by hand, and what the optional states mean") 
 }
 
 TEST_CASE("dead reckoning: Q is the covariance of Eq. (1) with noisy input, by Monte Carlo") {
-  auvest::DeadReckoning<double>::Params p;
+  auvest::SpeedHeading<double>::Params p;
   p.sigma_forward = 0.1;
   p.sigma_starboard = 0.05;
   p.sigma_heading = 0.02;
-  auvest::DeadReckoning<double> model(p);
+  auvest::SpeedHeading<double> model(p);
   const Vector<double, 3> input(2, 0.5, 0.7);
   model.input = input;
   const Matrix<double, 2, 2> q = model.Q(1);
@@ -449,7 +449,7 @@ TEST_CASE("odometry: increments compose") {
 TEST_CASE("leader range: the leader's uncertainty adds to R; at the leader nothing moves") {
   const auto model = leader<2>(7, 8);
   CHECK(model.R()(0, 0) == 25);
-  auvest::Ekf<auvest::DeadReckoning<double>> ekf{auvest::DeadReckoning<double>()};
+  auvest::Ekf<auvest::SpeedHeading<double>> ekf{auvest::SpeedHeading<double>()};
   const Vector<double, 2> there(7, 8);
   REQUIRE(ekf.reset(there, Matrix<double, 2, 2>::Identity()) == auvest::Status::kOk);
   CHECK(ekf.update(Vector<double, 1>(2.0), model).status == auvest::Status::kOk);
@@ -487,7 +487,7 @@ TEST_CASE("leader range: second-order terms against Monte Carlo") {
 }
 
 TEST_CASE("processes with an input: predict takes it, and refuses what is not finite") {
-  auvest::Ekf<auvest::DeadReckoning<double>> filter{auvest::DeadReckoning<double>()};
+  auvest::Ekf<auvest::SpeedHeading<double>> filter{auvest::SpeedHeading<double>()};
   REQUIRE(filter.reset(Vector<double, 2>(1, 2), Matrix<double, 2, 2>::Identity()) ==
           auvest::Status::kOk);
   const Vector<double, 3> input(2, 0, 0);
@@ -520,9 +520,9 @@ TEST_CASE("models refuse bad parameters") {
   CHECK(range_bearing(0, 1, 0, 0) == auvest::Status::kBadParameter);
   CHECK(range_bearing(0, 1, 1, -1) == auvest::Status::kBadParameter);
   for (const double bad : {-1.0, nan}) {
-    auvest::DeadReckoning<double>::Params reckoning;
+    auvest::SpeedHeading<double>::Params reckoning;
     reckoning.sigma_heading = bad;
-    CHECK(auvest::DeadReckoning<double>(reckoning).check() == auvest::Status::kBadParameter);
+    CHECK(auvest::SpeedHeading<double>(reckoning).check() == auvest::Status::kBadParameter);
     auvest::Odometry<double>::Params odometry;
     odometry.sigma_drift = bad;
     CHECK(auvest::Odometry<double>(odometry).check() == auvest::Status::kBadParameter);

@@ -18,7 +18,7 @@ using auvest::Vector;
 using auvest::math::Random;
 
 using Igg = auvest::Igg<double>;
-using Process = auvest::DeadReckoning<double>;
+using Process = auvest::SpeedHeading<double>;
 using Range = auvest::LeaderRange<double, 2>;
 using Streak = auvest::RejectionStreak<double>;
 

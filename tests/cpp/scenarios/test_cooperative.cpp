@@ -17,7 +17,7 @@ using auvest::Status;
 using auvest::Vector;
 using auvest::math::Random;
 
-using Process = auvest::DeadReckoning<double>;
+using Process = auvest::SpeedHeading<double>;
 using Range = auvest::LeaderRange<double, 2>;
 using Ekf = auvest::Ekf<Process>;
 using RobustEkf = auvest::RobustEkf<Process>;

@@ -65,7 +65,8 @@ struct RobustUpdate {
       const Status status = solve(a, noise, correction, posterior);
       if (status != Status::kOk) return status;
       ++correction.iterations;
-    } while (correction.iterations < params.max_iterations && reweight(a, noise, posterior.y, correction) &&
+    } while (correction.iterations < params.max_iterations &&
+             reweight(a, noise, posterior.y, correction) &&
              correction.decision != Decision::kRejected);
     if (correction.decision != Decision::kRejected) {
       Matrix<Scalar, O, O> moved;  // the recovery policy needs the prior's root

@@ -23,9 +23,9 @@
 namespace auvest {
 
 template <class Scalar_, bool HeadingBias = false, bool SpeedScale = false>
-struct DeadReckoning : ProcessModel<DeadReckoning<Scalar_, HeadingBias, SpeedScale>, Scalar_,
-                                    2 + int(HeadingBias) + int(SpeedScale)> {
-  using Base = ProcessModel<DeadReckoning<Scalar_, HeadingBias, SpeedScale>, Scalar_,
+struct SpeedHeading : ProcessModel<SpeedHeading<Scalar_, HeadingBias, SpeedScale>, Scalar_,
+                                   2 + int(HeadingBias) + int(SpeedScale)> {
+  using Base = ProcessModel<SpeedHeading<Scalar_, HeadingBias, SpeedScale>, Scalar_,
                             2 + int(HeadingBias) + int(SpeedScale)>;
   using Scalar = Scalar_;
   using Base::kStates;
@@ -45,7 +45,7 @@ struct DeadReckoning : ProcessModel<DeadReckoning<Scalar_, HeadingBias, SpeedSca
   Params params;
   Input input;
 
-  explicit DeadReckoning(const Params& p = Params()) : params(p) { math::set_zero(input); }
+  explicit SpeedHeading(const Params& p = Params()) : params(p) { math::set_zero(input); }
 
   /// Eq. (1).
   State f(const State& x, Scalar dt) const {
@@ -115,7 +115,7 @@ struct DeadReckoning : ProcessModel<DeadReckoning<Scalar_, HeadingBias, SpeedSca
     Scalar sine, cosine;
     Scalar vx, vy;  // [m/s]
 
-    Motion(const DeadReckoning& model, Scalar heading_bias, Scalar speed_scale) {
+    Motion(const SpeedHeading& model, Scalar heading_bias, Scalar speed_scale) {
       math::sincos(model.input(2) + heading_bias, sine, cosine);
       const Scalar factor = Scalar(1) + speed_scale;
       const Scalar forward = factor * model.input(0);
