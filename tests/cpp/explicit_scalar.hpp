@@ -86,6 +86,7 @@ inline void sincos(ExplicitDouble x, ExplicitDouble& s, ExplicitDouble& c) {
   s = ExplicitDouble(sine);
   c = ExplicitDouble(cosine);
 }
+inline void sincos_near(ExplicitDouble x, ExplicitDouble& s, ExplicitDouble& c) { sincos(x, s, c); }
 
 }  // namespace math
 }  // namespace auvest

@@ -53,9 +53,9 @@ static_assert(sizeof(float) == 4 && FLT_RADIX == 2 && FLT_MANT_DIG == 24,
 #endif
 
 // On the 8-bit chip a function that is called once is still called: inlined, its frame would lie on
-// the stack for as long as its caller's.
+// the stack for as long as its caller's. Nor is it copied to suit the arguments of one call.
 #if defined(__AVR__)
-#define AUVEST_OUTLINE __attribute__((noinline))
+#define AUVEST_OUTLINE __attribute__((noinline, noclone))
 #else
 #define AUVEST_OUTLINE
 #endif

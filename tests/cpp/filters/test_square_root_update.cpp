@@ -3,6 +3,7 @@
 #include "close.hpp"
 
 #include <Eigen/LU>
+#include <cmath>
 
 #include "auvest/filters/square_root_update.hpp"
 #include "auvest/math/random.hpp"
@@ -188,6 +189,76 @@ TEST_CASE("square-root update: an indefinite noise is refused") {
   Matrix<double, 2, 2> unseen = Matrix<double, 2, 2>::Zero();
   CHECK(auvest::SquareRootUpdate()(pair, root, none, unseen, indefinite, correction) ==
         Status::kNotPositiveDefinite);
+}
+
+TEST_CASE("square-root update: a number seen through the only two states, as the general code") {
+  using Root = Matrix<double, 2, 2>;
+  auvest::math::Random random(11);
+  for (int k = 0; k < 200; ++k) {
+    auvest::Belief<double, 2> general;
+    const double spread = std::pow(10.0, 3 * random.normal<double>());
+    const double c = 0.999 * std::sin(random.normal<double>());
+    general.x << random.normal<double>(), random.normal<double>();
+    general.P << 1, c * spread, c * spread, spread * spread;
+    auvest::Belief<double, 2> planar = general;
+
+    Root root, planar_root;
+    Matrix<double, 1, 2> slope;
+    using auvest::math::RaiseLostPivots;
+    REQUIRE(auvest::math::factor_leading<RaiseLostPivots, 2, 1, double, 2>(general.P, root, slope));
+    REQUIRE(auvest::math::factor_leading(planar.P, planar_root, slope));
+    CHECK(root == planar_root);
+
+    Matrix<double, 1, 2> a(random.normal<double>(), random.normal<double>());
+    Matrix<double, 1, 1> noise(std::exp(random.normal<double>()));
+    const Matrix<double, 1, 1> s(noise(0, 0) + a.squaredNorm());
+    const Vector<double, 1> innovation(3 * random.normal<double>());
+    Matrix<double, 1, 2> a_used = a;
+    Matrix<double, 1, 1> noise_used = noise;
+    auvest::Posterior<double, 2> posterior;
+    const bool finite = auvest::potter(a_used, noise_used, innovation, posterior) &&
+                        auvest::move_belief(general, root, slope, posterior);
+    REQUIRE(finite);
+    Correction<double, 1> correction(Status::kOk);
+    correction.innovation = innovation;
+    correction.S = s;
+    REQUIRE(auvest::correct_belief(planar, planar_root, slope, a, noise, correction) ==
+            Status::kOk);
+    CHECK(correction.nis == close_to(posterior.nis, 1e-14));
+    for (int i = 0; i < 2; ++i) {
+      const double scale = std::sqrt(general.P(i, i));
+      CHECK(std::fabs(planar.x(i) - general.x(i)) < 1e-13 * (scale + std::fabs(general.x(i))));
+      for (int j = 0; j <= i; ++j) {
+        const double size = scale * std::sqrt(general.P(j, j));
+        CHECK(std::fabs(planar.P(i, j) - general.P(i, j)) < 1e-12 * size);
+      }
+    }
+  }
+}
+
+TEST_CASE("square-root update: what a range cannot do leaves the belief") {
+  auvest::Belief<double, 2> belief;
+  belief.x << 1, 2;
+  belief.P << 4, 1, 1, 3;
+  const auvest::Belief<double, 2> before = belief;
+  Matrix<double, 2, 2> root;
+  Matrix<double, 1, 2> slope;
+  REQUIRE(auvest::math::factor_leading(belief.P, root, slope));
+  const auto with = [&](double noise_in, double innovation) {
+    Matrix<double, 2, 2> l = root;
+    Matrix<double, 1, 2> a(1, 1);
+    Matrix<double, 1, 1> noise(noise_in);
+    Correction<double, 1> correction(Status::kOk);
+    correction.innovation(0) = innovation;
+    correction.S(0, 0) = noise_in + 2;
+    return auvest::correct_belief(belief, l, slope, a, noise, correction);
+  };
+  CHECK(with(0, 1) == Status::kNotPositiveDefinite);
+  CHECK(with(-1, 1) == Status::kNotPositiveDefinite);
+  CHECK(with(std::nan(""), 1) == Status::kNotPositiveDefinite);
+  CHECK(with(1, 1e200) == Status::kOverflow);
+  CHECK(belief.x == before.x);
+  CHECK(belief.P == before.P);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include "auvest/intervals/covariance_budget.hpp"
 #include "auvest/intervals/fixed_interval.hpp"
 #include "auvest/models/constant_acceleration.hpp"
+#include "auvest/models/range_bearing.hpp"
 
 namespace {
 
@@ -72,6 +73,26 @@ TEST_CASE("adaptive interval: reset, refusal and restore") {
   CHECK(copy.interval() == law.interval());
   CHECK(copy.policy().memory.tau == law.policy().memory.tau);
   CHECK(copy.restore(law.belief(), law.policy(), std::nan("")) == Status::kNotFinite);
+}
+
+TEST_CASE("adaptive interval: made in place it is the filter with the default policy") {
+  auvest::Ukf<Process>::Params points;
+  points.alpha = 0.25;
+  auvest::Aukf<Process> in_place(Process(), points);
+  auvest::Aukf<Process> copied{auvest::Ukf<Process>(Process(), points)};
+  const Budgeted start = filter_with(0.1);
+  for (auvest::Aukf<Process>* filter : {&in_place, &copied}) {
+    REQUIRE(filter->reset(start.x(), start.P()) == Status::kOk);
+    REQUIRE(filter->predict(filter->interval()) == Status::kOk);
+    const Vector<double, 2> z(2.3, 0.9);
+    REQUIRE(filter->update(z, auvest::RangeBearing<double, 6>()).status == Status::kOk);
+    REQUIRE(filter->feedback(Vector<double, 2>(0.1, 0.2)) == Status::kOk);
+  }
+  CHECK(in_place.x() == copied.x());
+  CHECK(in_place.P() == copied.P());
+  CHECK(in_place.interval() == copied.interval());
+  points.alpha = 2;
+  CHECK(auvest::Aukf<Process>(Process(), points).check() == Status::kBadParameter);
 }
 
 TEST_CASE("bad parameters are reported") {

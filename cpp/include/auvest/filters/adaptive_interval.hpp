@@ -25,27 +25,28 @@ class AdaptiveInterval : public Filter {
         interval_(policy.initial()),
         policy_check_(policy.check()) {}
 
+  /// The filter made from its own arguments, with the default policy: in place, because on a chip
+  /// copies take flash and stack.
+  template <class F = Filter>
+  AdaptiveInterval(const typename F::Process& process, const typename F::Params& params)
+      : Filter(process, params),
+        policy_(),
+        interval_(policy_.initial()),
+        policy_check_(Status::kOk) {}
+
   /// Sets the belief and starts the policy; `reference` is the desired position (m) at step 0.
   Status reset(const State& x0, const Covariance& P0, const Position& reference) {
     if (!math::all_finite(reference)) return Status::kNotFinite;
     if (policy_check_ != Status::kOk) return policy_check_;
     const Status status = Filter::reset(x0, P0);
     if (status != Status::kOk) return status;
-    Position estimate;
-    estimate(0) = x0(0);
-    estimate(1) = x0(1);
-    policy_.restart(estimate, reference);
+    policy_.restart(position(x0), reference);
     interval_ = policy_.initial();
     return Status::kOk;
   }
 
   /// As above, with the desired track starting where the filter does: X(0) = R(0).
-  Status reset(const State& x0, const Covariance& P0) {
-    Position reference;
-    reference(0) = x0(0);
-    reference(1) = x0(1);
-    return reset(x0, P0, reference);
-  }
+  Status reset(const State& x0, const Covariance& P0) { return reset(x0, P0, position(x0)); }
 
   /// Takes back what belief(), policy() and interval() gave: the same bits go on.
   Status restore(const BeliefType& belief, const Policy& policy, Scalar interval) {
@@ -60,7 +61,7 @@ class AdaptiveInterval : public Filter {
   }
 
   /// Chooses the interval to the next sample; `reference` is the desired position (m) now.
-  AUVEST_OUTLINE Status feedback(const Position& reference) {
+  Status feedback(const Position& reference) {
     if (!this->initialised()) return Status::kNotInitialised;
     if (!math::all_finite(reference)) return Status::kNotFinite;
     interval_ = policy_.next(*this, reference);
@@ -71,6 +72,13 @@ class AdaptiveInterval : public Filter {
   const Policy& policy() const { return policy_; }
 
  private:
+  static Position position(const State& x) {
+    Position p;
+    p(0) = x(0);
+    p(1) = x(1);
+    return p;
+  }
+
   Policy policy_;
   Scalar interval_;
   Status policy_check_;

@@ -85,7 +85,7 @@ class GaussianFilter {
                                                          const Model& model) {
     static_assert(Model::kStates == kStates, "the measurement model is for another state");
     constexpr int kSize = Model::kSize;
-    Correction<Scalar, kSize> correction(Status::kOk);
+    Correction<Scalar, kSize> correction;
     correction.status = correct(z, model, SquareRootUpdate(), correction);
     if (correction.status != Status::kOk) correction.clear(correction.status);
     return correction;

@@ -12,6 +12,7 @@
 #pragma once
 
 #include "auvest/math/basic.hpp"
+#include "auvest/math/linear_algebra.hpp"
 #include "auvest/status.hpp"
 #include "auvest/types.hpp"
 
@@ -28,7 +29,7 @@ struct SigmaPoints {
   Scalar sqrt_c;       ///< sigma points lie at x +- sqrt_c L_i
   Scalar half_sqrt_c;  ///< 1 / (2 sqrt c): turns sums and differences into s_i and t_i
   Scalar mean_weight;  ///< 1 / sqrt c: m = mean_weight sum_i s_i
-  Scalar centre;       ///< beta - alpha^2, the weight of m m'
+  Scalar centre_root;  ///< sqrt(beta - alpha^2), whose square is the weight of m m'
   Status status;       ///< kBadParameter if the parameters are out of range
   bool fine;           ///< c is so small that subtracted deviations would have lost their digits
 
@@ -44,7 +45,7 @@ struct SigmaPoints {
     sqrt_c = valid ? sqrt(c) : Scalar(1);
     half_sqrt_c = Scalar(0.5) / sqrt_c;
     mean_weight = Scalar(1) / sqrt_c;
-    centre = params.beta - params.alpha * params.alpha;
+    centre_root = valid ? sqrt(params.beta - params.alpha * params.alpha) : Scalar(0);
     // Subtraction leaves h(x+e) - h(x) with an error of one ulp of h, and the transform divides
     // its second differences by c: below c = sqrt(epsilon) fewer than half the digits are left.
     fine = c * c < math::machine_epsilon<Scalar>();
@@ -58,28 +59,30 @@ struct SigmaPoints {
   AUVEST_INLINE void transform(const Point& point, const Matrix<Scalar, O, O>& root,
                                Matrix<Scalar, M, O>& t, Vector<Scalar, M>& shift,
                                Matrix<Scalar, M, M>& e) const {
+    Matrix<Scalar, M, O + 1> s;  // the s_i and, last, the term of the mean
     AUVEST_UNROLL
     for (int k = 0; k < O; ++k) {
       Vector<Scalar, O> step;
       AUVEST_UNROLL
-      for (int i = 0; i < O; ++i) step(i) = i < k ? Scalar(0) : sqrt_c * root(i, k);
+      for (int i = 0; i < O; ++i) step(i) = sqrt_c * root(i, k);
       Vector<Scalar, M> sum;
       Vector<Scalar, M> difference;
       point.deviations(step, sum, difference);
       AUVEST_UNROLL
       for (int m = 0; m < M; ++m) {
-        t(m, k) = half_sqrt_c * difference(m);  // t_k
-        sum(m) = half_sqrt_c * sum(m);          // s_k
-        shift(m) = k == 0 ? sum(m) : shift(m) + sum(m);
-        AUVEST_UNROLL
-        for (int l = 0; l <= m; ++l) e(m, l) = e(m, l) + sum(m) * sum(l);
+        t(m, k) = half_sqrt_c * difference(m);
+        s(m, k) = half_sqrt_c * sum(m);
       }
     }
     AUVEST_UNROLL
     for (int m = 0; m < M; ++m) {
-      shift(m) = mean_weight * shift(m);
+      Scalar total = s(m, 0);
       AUVEST_UNROLL
-      for (int l = 0; l <= m; ++l) e(m, l) = e(m, l) + centre * shift(m) * shift(l);
+      for (int k = 1; k < O; ++k) total = total + s(m, k);
+      shift(m) = mean_weight * total;
+      s(m, O) = centre_root * shift(m);
+      AUVEST_UNROLL
+      for (int l = 0; l <= m; ++l) e(m, l) = math::plus_dot(e(m, l), &s(m, 0), &s(l, 0), O + 1);
     }
   }
 };

@@ -43,6 +43,7 @@ struct Correction {
   Matrix<Scalar, M, M> S;  ///< covariance of the innovation
   Scalar nis;              ///< normalised innovation squared, chi-square with M degrees of freedom
 
+  Correction() {}  ///< to be filled by an update
   explicit Correction(Status s) { clear(s); }
 
   void clear(Status s) {
@@ -100,51 +101,44 @@ AUVEST_OUTLINE AUVEST_INLINE math::Mask<Value> potter(Matrix<Value, M, O>& a,
                                                       Matrix<Value, M, M>& noise,
                                                       const Vector<Value, M>& innovation,
                                                       Posterior<Value, O>& posterior) {
-  using math::dot;
+  using math::add_scaled;
   using math::is_finite;
-  using math::minus_dot;
-  using math::plus_dot;
   using math::sqrt;
   Vector<Value, O>& y = posterior.y;
   Matrix<Value, O, O>& g = posterior.g;
+  math::set_zero(y);
+  math::set_zero(g);
+  AUVEST_UNROLL
+  for (int k = 0; k < O; ++k) g(k, k) = Value(1);
   Vector<Value, M> residual;  // the innovation decorrelated
   posterior.nis = Value(0);
   math::Mask<Value> finite = is_finite(noise(0, 0));
   AUVEST_UNROLL
   for (int m = 0; m < M; ++m) {
-    residual(m) = minus_dot(innovation(m), &noise(m, 0), residual.data(), m);
+    Value* const row = &a(m, 0);
+    residual(m) = math::minus_dot(innovation(m), &noise(m, 0), residual.data(), m);
     AUVEST_UNROLL
-    for (int l = 0; l < m; ++l) {
-      AUVEST_UNROLL
-      for (int k = 0; k < O; ++k) a(m, k) = a(m, k) - noise(m, l) * a(l, k);
-    }
-    const bool first = m == 0;  // y = 0 and G = I
-    Vector<Value, O> f;         // G' a
+    for (int l = 0; l < m; ++l) add_scaled(-noise(m, l), &a(l, 0), row, O);
+    Vector<Value, O> f;  // G' a
     AUVEST_UNROLL
-    for (int k = 0; k < O; ++k) f(k) = first ? a(m, k) : dot(&g(k, 0), &a(m, 0), O);
-    const Value spread = plus_dot(noise(m, m), f.data(), f.data(), O);
+    for (int k = 0; k < O; ++k) f(k) = math::dot(&g(k, 0), row, O);
+    const Value spread = math::plus_dot(noise(m, m), f.data(), f.data(), O);
     const Value gamma = Value(1) / (spread + sqrt(noise(m, m) * spread));
     // f and with it all that follows from it is bounded by these two.
     finite = finite && is_finite(spread) && is_finite(gamma);
     noise(m, m) = spread;
-    const Value surprise = first ? residual(m) : minus_dot(residual(m), &a(m, 0), y.data(), O);
+    const Value surprise = math::minus_dot(residual(m), row, y.data(), O);
     const Value step = surprise / spread;
     posterior.nis = posterior.nis + step * surprise;
+    Vector<Value, O> v;  // G f
+    math::set_zero(v);
     AUVEST_UNROLL
-    for (int k = 0; k < O; ++k) {
-      Value v = f(k);  // G f
-      if (!first) {
-        v = g(0, k) * f(0);
-        AUVEST_UNROLL
-        for (int l = 1; l < O; ++l) v = v + g(l, k) * f(l);
-      }
-      y(k) = first ? v * step : y(k) + v * step;
-      const Value scaled = v * gamma;
-      AUVEST_UNROLL
-      for (int l = 0; l < O; ++l) {
-        g(l, k) = (first ? Value(k == l ? 1 : 0) : g(l, k)) - scaled * f(l);
-      }
-    }
+    for (int k = 0; k < O; ++k) add_scaled(f(k), &g(k, 0), v.data(), O);
+    add_scaled(step, v.data(), y.data(), O);
+    AUVEST_UNROLL
+    for (int k = 0; k < O; ++k) v(k) = v(k) * gamma;
+    AUVEST_UNROLL
+    for (int k = 0; k < O; ++k) add_scaled(-f(k), v.data(), &g(k, 0), O);
   }
   return finite && is_finite(posterior.nis);
 }
@@ -158,6 +152,7 @@ AUVEST_OUTLINE AUVEST_INLINE math::Mask<Value> move_belief(Belief<Value, N>& bel
                                                            const Posterior<Value, O>& posterior) {
   using math::any;
   using math::dot;
+  using math::larger;
   Vector<Value, N> x;
   Vector<Value, O> shift;  // L y
   AUVEST_UNROLL
@@ -190,23 +185,81 @@ AUVEST_OUTLINE AUVEST_INLINE math::Mask<Value> move_belief(Belief<Value, N>& bel
 
   // The others, by their regression on the observed ones. What is left of a variance is at least
   // what the format resolves.
+  const Value* b = slope.data();
   AUVEST_UNROLL
   for (int i = O; i < N; ++i) {
-    Vector<Value, O> change;  // row i of P_uo - P_uo+
+    Value* const row = &belief.P(i, 0);
+    Value change[O];  // row i of P_uo - P_uo+
     AUVEST_UNROLL
     for (int k = 0; k < O; ++k) {
-      const Value after = dot(&slope(i - O, 0), &belief.P(k, 0), O);
-      change(k) = belief.P(i, k) - after;
-      belief.P(i, k) = after;
+      const Value after = dot(b, &belief.P(k, 0), O);
+      change[k] = row[k] - after;
+      row[k] = after;
     }
-    const Value floor = math::pivot_floor(belief.P(i, i));
+    const Value floor = math::pivot_floor(row[i]);
+    const Value* other = slope.data();
     AUVEST_UNROLL
     for (int j = O; j <= i; ++j) {
-      belief.P(i, j) = math::minus_dot(belief.P(i, j), change.data(), &slope(j - O, 0), O);
+      row[j] = math::minus_dot(row[j], change, other, O);
+      other += O;
     }
-    belief.P(i, i) = math::larger(belief.P(i, i), floor);
+    row[i] = larger(row[i], floor);
+    b += O;
   }
   return finite;
+}
+
+/// The update from S on: moves `belief` by the innovation and S of `correction`, and gives it the
+/// NIS. `a` is A, `noise` is E (lower triangle); `root` and `slope` are those of
+/// math::factor_leading. Uses up all but `slope`.
+template <int M, int O, int U, class Scalar, int N>
+AUVEST_INLINE Status correct_belief(Belief<Scalar, N>& belief, Matrix<Scalar, O, O>& root,
+                                    const Matrix<Scalar, U, O>& slope, Matrix<Scalar, M, O>& a,
+                                    Matrix<Scalar, M, M>& noise,
+                                    Correction<Scalar, M>& correction) {
+  if (!math::ldlt(noise)) return Status::kNotPositiveDefinite;
+  Posterior<Scalar, O> posterior;
+  if (!potter(a, noise, correction.innovation, posterior)) return Status::kOverflow;
+  correction.nis = posterior.nis;
+  return move_belief(belief, root, slope, posterior) ? Status::kOk : Status::kOverflow;
+}
+
+/// The same for one number seen through the only two states: a range. G is I less a matrix of rank
+/// one, so that L G = L - gamma (L f) f' and the shift of the mean is a multiple of L f.
+template <class Scalar>
+AUVEST_OUTLINE AUVEST_INLINE Status correct_belief(
+    Belief<Scalar, 2>& belief, Matrix<Scalar, 2, 2>& root, const Matrix<Scalar, 1, 2>&,
+    Matrix<Scalar, 1, 2>& a, Matrix<Scalar, 1, 1>& noise, Correction<Scalar, 1>& correction) {
+  using math::sqrt;
+  if (!(noise(0, 0) > Scalar(0))) return Status::kNotPositiveDefinite;
+  const Scalar innovation = correction.innovation(0);
+  const Scalar spread = correction.S(0, 0);
+  const Scalar gamma = Scalar(1) / (spread + sqrt(noise(0, 0) * spread));
+  const Scalar step = innovation / spread;
+  const Scalar nis = step * innovation;
+  const Scalar f0 = a(0, 0);
+  const Scalar f1 = a(0, 1);
+  const Scalar v0 = root(0, 0) * f0;  // L f
+  const Scalar v1 = root(1, 0) * f0 + root(1, 1) * f1;
+  const Scalar x0 = belief.x(0) + v0 * step;
+  const Scalar x1 = belief.x(1) + v1 * step;
+  const bool finite = math::is_finite(spread) && math::is_finite(gamma) && math::is_finite(nis) &&
+                      math::is_finite(x0) && math::is_finite(x1);
+  if (!finite) return Status::kOverflow;
+  correction.nis = nis;
+  belief.x(0) = x0;
+  belief.x(1) = x1;
+  const Scalar w0 = gamma * v0;
+  const Scalar w1 = gamma * v1;
+  const Scalar l00 = root(0, 0) - w0 * f0;
+  const Scalar l01 = -(w0 * f1);
+  const Scalar l10 = root(1, 0) - w1 * f0;
+  const Scalar l11 = root(1, 1) - w1 * f1;
+  belief.P(0, 0) = l00 * l00 + l01 * l01;
+  belief.P(1, 0) = l10 * l00 + l11 * l01;
+  belief.P(0, 1) = belief.P(1, 0);
+  belief.P(1, 1) = l10 * l10 + l11 * l11;
+  return Status::kOk;
 }
 
 /// The update as a rule of GaussianFilter. Moves `belief`. `root` is L and `slope` is B of
@@ -220,11 +273,7 @@ struct SquareRootUpdate {
                                   Matrix<Scalar, M, M>& noise,
                                   Correction<Scalar, M>& correction) const {
     innovation_covariance(a, noise, correction.S);
-    if (!math::ldlt(noise)) return Status::kNotPositiveDefinite;
-    Posterior<Scalar, O> posterior;
-    if (!potter(a, noise, correction.innovation, posterior)) return Status::kOverflow;
-    correction.nis = posterior.nis;
-    return move_belief(belief, root, slope, posterior) ? Status::kOk : Status::kOverflow;
+    return correct_belief(belief, root, slope, a, noise, correction);
   }
 };
 

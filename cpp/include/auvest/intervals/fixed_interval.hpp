@@ -5,7 +5,8 @@
 //     Scalar initial() const              T(0) [s]
 //     void   restart(estimate, reference) forget the past; both positions are those of step 0
 //     Scalar next(filter, reference)      T(k) [s], after the update of step k
-//     Status check() const                kOk, or kBadParameter if a parameter is out of range
+//     Status check() const                kOk, or kBadParameter if a parameter is out of range;
+//                                         its defaults are in range
 //
 // where `reference` is the position (m) of the desired track at step k.
 #pragma once

@@ -55,7 +55,7 @@ struct MahalanobisInterval {
   Params params;
   Memory memory;
 
-  explicit MahalanobisInterval(const Params& p = Params()) : params(p) {
+  explicit MahalanobisInterval(const Params& p = defaults()) : params(p) {
     Position origin;
     origin(0) = origin(1) = Scalar(0);
     restart(origin, origin);
@@ -63,7 +63,7 @@ struct MahalanobisInterval {
 
   Scalar initial() const { return params.initial_s; }
 
-  void restart(const Position& estimate, const Position& reference) {
+  AUVEST_OUTLINE void restart(const Position& estimate, const Position& reference) {
     memory.tau = params.tau0;
     memory.interval = params.initial_s;
     memory.ratio = memory.mahalanobis_squared = Scalar(0);
@@ -72,16 +72,14 @@ struct MahalanobisInterval {
   }
 
   template <class Filter>
-  Scalar next(const Filter& filter, const Position& reference) {
+  AUVEST_OUTLINE Scalar next(const Filter& filter, const Position& reference) {
     Memory& m = memory;
     Steps steps;
     for (int i = 0; i < 2; ++i) {
-      const Scalar estimate = filter.x()(i);
-      steps.a[i] = estimate - m.last_estimate(i);
-      steps.b[i] = reference(i) - m.last_reference(i);
-      steps.c[i] = (estimate - reference(i)) + (m.last_estimate(i) - m.last_reference(i));
-      m.last_estimate(i) = estimate;
-      m.last_reference(i) = reference(i);
+      const Scalar error = m.last_estimate(i) - m.last_reference(i);
+      steps.a[i] = step(m.last_estimate(i), filter.x()(i));
+      steps.b[i] = step(m.last_reference(i), reference(i));
+      steps.c[i] = (m.last_estimate(i) - m.last_reference(i)) + error;
     }
     const Scalar aa = dot(steps.a, steps.a);
     const Scalar bb = dot(steps.b, steps.b);
@@ -107,6 +105,12 @@ struct MahalanobisInterval {
   }
 
  private:
+  /// Params() as a constant to copy: on a chip, half the flash of assignments.
+  static const Params& defaults() {
+    static const Params params;
+    return params;
+  }
+
   /// Not a number counts as low.
   AUVEST_OUTLINE static Scalar clamp(Scalar value, Scalar low, Scalar high) {
     if (!(value > low)) return low;
@@ -120,10 +124,14 @@ struct MahalanobisInterval {
     Scalar c[2];  // X(k) + X(k-1) - R(k) - R(k-1)
   };
 
-  static Scalar dot(const Scalar* u, const Scalar* v) { return math::dot(u, v, 2); }
-  AUVEST_OUTLINE static Scalar cross(const Scalar* u, const Scalar* v) {
-    return u[0] * v[1] - u[1] * v[0];
+  /// Moves `last` to `now`, and says by how much.
+  static Scalar step(Scalar& last, Scalar now) {
+    const Scalar change = now - last;
+    last = now;
+    return change;
   }
+
+  static Scalar dot(const Scalar* u, const Scalar* v) { return math::dot(u, v, 2); }
 
   /// Eqs. (9) to (11): squared Mahalanobis distance of the estimate from the four points.
   ///
@@ -138,14 +146,22 @@ struct MahalanobisInterval {
   /// the start, where X(0) = R(0), and on noise-free straight legs: epsilon times its trace is
   /// added to its diagonal, which gives the pseudo-inverse's distance along the line there. It is
   /// felt where the points are closer to a line than some sqrt(epsilon) of their spread (1e-3 in
-  /// float), and nowhere else. If all four points coincide (or overflow), d^2 = 0.
+  /// float), and nowhere else. If all four points coincide (or the squares of their distances
+  /// under- or overflow), d^2 = 0.
   static Scalar squared_distance(Steps& s, Scalar aa, Scalar bb) {
+    using math::cross;
     const Scalar two = Scalar(2);
     Scalar trace = two * (aa + bb) + dot(s.c, s.c);  // of 12 S
     // d^2 does not change with the unit of length: take one in which fourth powers fit.
     if (!(trace > Scalar(1e-8) && trace < Scalar(1e8))) {
-      if (!rescale(s)) return Scalar(0);
-      trace = two * (dot(s.a, s.a) + dot(s.b, s.b)) + dot(s.c, s.c);
+      if (!math::is_positive(trace)) return Scalar(0);
+      const Scalar unit = Scalar(1) / math::sqrt(trace);
+      for (int i = 0; i < 2; ++i) {
+        s.a[i] = s.a[i] * unit;
+        s.b[i] = s.b[i] * unit;
+        s.c[i] = s.c[i] * unit;
+      }
+      trace = Scalar(1);
     }
     const Scalar ab = two * cross(s.a, s.b);
     const Scalar ac = cross(s.a, s.c);
@@ -155,20 +171,6 @@ struct MahalanobisInterval {
     const Scalar form = (Scalar(3) * (ac * ac) + (ab - bc) * (ab - bc)) + ridge * dot(reach, reach);
     const Scalar determinant = (Scalar(0.5) * (ab * ab) + (ac * ac + bc * bc)) + ridge * trace;
     return Scalar(0.75) * (form / determinant);  // Eq. (11)
-  }
-
-  /// Makes the largest component 1; false if none is larger than 1e-30, or not all are finite.
-  static bool rescale(Steps& s) {
-    Scalar* const vectors[3] = {s.a, s.b, s.c};
-    Scalar largest = Scalar(1e-30);
-    for (int i = 0; i < 6; ++i) {
-      const Scalar value = vectors[i / 2][i % 2];
-      if (!math::is_finite(value)) return false;
-      const Scalar size = value < Scalar(0) ? -value : value;
-      if (size > largest) largest = size;
-    }
-    for (int i = 0; i < 6; ++i) vectors[i / 2][i % 2] = vectors[i / 2][i % 2] / largest;
-    return largest > Scalar(1e-30);
   }
 };
 

@@ -15,22 +15,28 @@
 
 namespace auvest {
 namespace math {
-namespace detail {
 
-/// wrap() for a float outside [-pi, pi], and for -pi.
-AUVEST_OUTLINE inline float wrap_outside(float a) {
-  const float size = absolute(a);
-  if (size <= 9.424777f) {  // 3 pi, rounded down
+/// The angle of (-pi, pi] that is congruent to `a` (rad) modulo 2 pi. "pi" as a bound is the
+/// nearest float (double) to pi; an angle inside the bounds comes back bit for bit, others are
+/// reduced modulo the real 2 pi, to within 1 ulp. Not finite: NaN.
+AUVEST_OUTLINE AUVEST_INLINE float wrap(float a) {
+  const uint32_t sign = to_bits(a) & 0x80000000u;
+  const uint32_t size = to_bits(a) ^ sign;
+  if (size < 0x40490fdbu) return a;  // pi
+  if (size == 0x40490fdbu) return pi<float>();
+  if (size >= 0x7f800000u) return quiet_nan();
+  float wrapped = from_bits(size);
+  if (size <= 0x4116cbe3u) {  // 3 pi, rounded down
     // Exact, then one rounding: 2 pi = 6.28318548 - 1.74845553e-07.
-    if (size == pi<float>()) return size;
-    const float wrapped = (size - 6.28318548f) + 1.74845553e-07f;
-    return a < 0.0f ? -wrapped : wrapped;
+    wrapped = (wrapped - 6.28318548f) + 1.74845553e-07f;
+  } else {
+    wrapped = detail::turn_to_radian(detail::fraction_of_turn(wrapped));
+    if (absolute(wrapped) == pi<float>()) return pi<float>();
   }
-  if (!is_finite(a)) return quiet_nan();
-  const float wrapped = turn_to_radian(fraction_of_turn(size));
-  if (absolute(wrapped) == pi<float>()) return pi<float>();
-  return a < 0.0f ? -wrapped : wrapped;
+  return from_bits(to_bits(wrapped) ^ sign);
 }
+
+namespace detail {
 
 /// wrap() for a double outside [-pi, pi], by the size of double.
 template <std::size_t Bytes>
@@ -53,20 +59,11 @@ struct DoubleWrap {
 
 template <>
 struct DoubleWrap<4> {
-  static double outside(double a) {
-    return static_cast<double>(wrap_outside(static_cast<float>(a)));
-  }
+  static double outside(double a) { return static_cast<double>(wrap(static_cast<float>(a))); }
 };
 
 }  // namespace detail
 
-/// The angle of (-pi, pi] that is congruent to `a` (rad) modulo 2 pi. "pi" as a bound is the
-/// nearest float (double) to pi; an angle inside the bounds comes back bit for bit, others are
-/// reduced modulo the real 2 pi, to within 1 ulp. Not finite: NaN.
-AUVEST_INLINE float wrap(float a) {
-  if (a > -pi<float>() && a <= pi<float>()) return a;
-  return detail::wrap_outside(a);
-}
 AUVEST_INLINE double wrap(double a) {
   if (a > -pi<double>() && a <= pi<double>()) return a;
   return detail::DoubleWrap<sizeof(double)>::outside(a);

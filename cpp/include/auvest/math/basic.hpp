@@ -76,6 +76,9 @@ AUVEST_INLINE bool is_nonnegative(Scalar value) {
 }
 
 /// True if 0 < value, not subnormal, and finite.
+AUVEST_INLINE bool is_positive(float value) {
+  return to_bits(value) - 0x00800000u < 0x7f800000u - 0x00800000u;
+}
 template <class Scalar>
 AUVEST_INLINE bool is_positive(Scalar value) {
   return within(value, (std::numeric_limits<Scalar>::min)(), (std::numeric_limits<Scalar>::max)());

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <cstring>
+#include <limits>
 
 #include "auvest/math/basic.hpp"
 #include "auvest/math/select.hpp"
@@ -38,6 +39,19 @@ AUVEST_OUTLINE AUVEST_INLINE Value minus_dot(Value start, const Value* u, const 
 template <class Value>
 AUVEST_OUTLINE AUVEST_INLINE Value dot(const Value* u, const Value* v, int count) {
   return plus_dot(u[0] * v[0], u + 1, v + 1, count - 1);
+}
+
+/// u x v in the plane.
+template <class Value>
+AUVEST_OUTLINE AUVEST_INLINE Value cross(const Value* u, const Value* v) {
+  return u[0] * v[1] - u[1] * v[0];
+}
+
+/// y[i] += scale x[i].
+template <class Value>
+AUVEST_OUTLINE AUVEST_INLINE void add_scaled(Value scale, const Value* x, Value* y, int count) {
+  AUVEST_UNROLL
+  for (int i = 0; i < count; ++i) y[i] = y[i] + scale * x[i];
 }
 
 /// Fills a matrix with zeros.
@@ -96,16 +110,19 @@ inline void mirror_lower(Matrix<Scalar, N, N>& a) {
 /// there are no empty arrays.
 constexpr int other_states(int n, int o) { return n > o ? n - o : 1; }
 
+/// True if all numbers are finite.
+template <class Value>
+AUVEST_OUTLINE AUVEST_INLINE Mask<Value> all_finite(const Value* a, int count) {
+  Mask<Value> finite = is_finite(a[0]);
+  AUVEST_UNROLL
+  for (int i = 1; i < count; ++i) finite = finite && is_finite(a[i]);
+  return finite;
+}
+
 /// True if every element is finite.
 template <class Value, int Rows, int Cols>
 AUVEST_INLINE Mask<Value> all_finite(const Matrix<Value, Rows, Cols>& a) {
-  Mask<Value> finite = is_finite(a(0, 0));
-  AUVEST_UNROLL
-  for (int i = 0; i < Rows; ++i) {
-    AUVEST_UNROLL
-    for (int j = 0; j < Cols; ++j) finite = finite && is_finite(a(i, j));
-  }
-  return finite;
+  return all_finite(a.data(), Rows * Cols);
 }
 
 /// True if every element of the lower triangle is finite.
@@ -113,10 +130,7 @@ template <class Scalar, int N>
 AUVEST_INLINE bool lower_finite(const Matrix<Scalar, N, N>& a) {
   bool finite = true;
   AUVEST_UNROLL
-  for (int i = 0; i < N; ++i) {
-    AUVEST_UNROLL
-    for (int j = 0; j <= i; ++j) finite = finite && is_finite(a(i, j));
-  }
+  for (int i = 0; i < N; ++i) finite = finite && all_finite(&a(i, 0), i + 1);
   return finite;
 }
 
@@ -132,27 +146,14 @@ AUVEST_INLINE Value pivot_floor(const Value& diagonal) {
   return Value(4) * machine_epsilon<Value>() * diagonal;
 }
 
-/// pivot_floor() of all diagonal elements. False if one is not positive (or is NaN).
-template <class Value, int N>
-AUVEST_INLINE Mask<Value> pivot_floors(const Matrix<Value, N, N>& a, Vector<Value, N>& floor) {
-  Mask<Value> positive = a(0, 0) > Value(0);
-  AUVEST_UNROLL
-  for (int i = 0; i < N; ++i) {
-    positive = positive && a(i, i) > Value(0);
-    floor(i) = pivot_floor(a(i, i));
-  }
-  return positive;
-}
-
 /// For a positive definite matrix: a pivot below its floor is raised to it, which adds a variance
 /// the format cannot resolve and keeps the root real.
 struct RaiseLostPivots {
   template <class Value>
-  static AUVEST_INLINE void invert(const Value& pivot, const Value& floor, Value& root,
-                                   Value& inverse) {
+  static AUVEST_INLINE Value keep(const Value& pivot, const Value& floor, Value& inverse) {
     const Value raised = larger(pivot, floor);
     inverse = Value(1) / raised;
-    root = sqrt(raised);
+    return raised;
   }
 };
 
@@ -160,46 +161,79 @@ struct RaiseLostPivots {
 /// so the rank does not grow.
 struct DropLostPivots {
   template <class Value>
-  static AUVEST_INLINE void invert(const Value& pivot, const Value& floor, Value& root,
-                                   Value& inverse) {
+  static AUVEST_INLINE Value keep(const Value& pivot, const Value& floor, Value& inverse) {
     const Mask<Value> lost = !(pivot > floor);
-    const Value kept = select(lost, Value(1), pivot);
-    inverse = select(lost, Value(0), Value(1) / kept);
-    root = select(lost, Value(0), sqrt(kept));
+    inverse = select(lost, Value(0), Value(1) / select(lost, Value(1), pivot));
+    return select(lost, Value(0), pivot);
   }
 };
+
+/// a = L D L' with a unit lower triangular L, in place, for the symmetric matrix `a` of n rows
+/// (lower triangle): D on the diagonal, L below it, room to work above it. `inverse` is that of D.
+/// `LostPivots` says what becomes of pivots that are lost in rounding noise. False if a diagonal
+/// element of `a` is not positive (or is NaN), or a pivot is below `least` times it.
+template <class LostPivots = RaiseLostPivots, class Value>
+AUVEST_OUTLINE AUVEST_INLINE Mask<Value> ldlt(Value* a, int n, Value least, Value* inverse) {
+  Mask<Value> definite = *a > Value(0);
+  Value* row = a;
+  AUVEST_UNROLL
+  for (int i = 0; i < n; ++i) {
+    const Value diagonal = row[i];
+    Value* above = a;
+    AUVEST_UNROLL
+    for (int k = 0; k < i; ++k) {
+      above[i] = row[k];  // unscaled, as this row and those to come need it
+      row[k] = row[k] * inverse[k];
+      add_scaled(-row[k], above + k + 1, row + k + 1, i - k);
+      above += n;
+    }
+    definite = definite && diagonal > Value(0) && !(row[i] < least * diagonal);
+    row[i] = LostPivots::keep(row[i], pivot_floor(diagonal), inverse[i]);
+    row += n;
+  }
+  return definite;
+}
+
+/// The same for a positive definite matrix that may have lost that to rounding: false, with `a`
+/// left unusable, if it is indefinite.
+template <class Value, int N>
+AUVEST_INLINE Mask<Value> ldlt(Matrix<Value, N, N>& a) {
+  Vector<Value, N> inverse;
+  return ldlt(a.data(), N, -(Value(N) * pivot_floor(Value(1))), inverse.data());
+}
+
+/// The same for a number, which is its own D.
+template <class Value>
+AUVEST_INLINE Mask<Value> ldlt(Matrix<Value, 1, 1>& a) {
+  return a(0, 0) > Value(0);
+}
 
 /// The root of the leading O x O block of the symmetric matrix `p`, and the regression of the other
 /// components on the first O: with p the covariance of (v_o, v_u),
 ///
 ///     P_oo = root root',   v_u = slope v_o + (what v_o says nothing about),  slope = P_uo P_oo^-1.
 ///
-/// `LostPivots` says what becomes of pivots that are lost in rounding noise. False if a diagonal
-/// element of the block is not positive (or is NaN).
+/// `LostPivots` as in ldlt(). False if a diagonal element of the block is not positive (or is NaN).
 template <class LostPivots = RaiseLostPivots, int O, int U, class Value, int N>
 AUVEST_OUTLINE AUVEST_INLINE Mask<Value> factor_leading(const Matrix<Value, N, N>& p,
                                                         Matrix<Value, O, O>& root,
                                                         Matrix<Value, U, O>& slope) {
   static_assert(0 < O && O <= N && U == other_states(N, O), "the first O of N components");
-  Matrix<Value, O, O> l;  // P_oo = L D L', unit lower triangular; D on the diagonal for a while
+  Matrix<Value, O, O> l;  // P_oo = L D L', unit lower triangular; D on the diagonal
   AUVEST_UNROLL
   for (int i = 0; i < O; ++i) {
     AUVEST_UNROLL
     for (int j = 0; j <= i; ++j) l(i, j) = p(i, j);
   }
-  Vector<Value, O> floor;
-  const Mask<Value> positive = pivot_floors(l, floor);
   Vector<Value, O> inverse;
+  const Value any_size(std::numeric_limits<typename ScalarOf<Value>::Type>::lowest());
+  const Mask<Value> positive = ldlt<LostPivots>(l.data(), O, any_size, inverse.data());
   AUVEST_UNROLL
   for (int k = 0; k < O; ++k) {
-    LostPivots::invert(l(k, k), floor(k), root(k, k), inverse(k));
+    root(k, k) = sqrt(l(k, k));
     AUVEST_UNROLL
-    for (int i = O - 1; i > k; --i) {  // upwards: row i needs the unscaled column above it
-      const Value scaled = l(i, k) * inverse(k);
-      AUVEST_UNROLL
-      for (int j = k + 1; j <= i; ++j) l(i, j) = l(i, j) - scaled * l(j, k);
-      l(i, k) = scaled;
-      root(i, k) = scaled * root(k, k);
+    for (int i = k + 1; i < O; ++i) {
+      root(i, k) = l(i, k) * root(k, k);
       root(k, i) = Value(0);
     }
   }
@@ -221,50 +255,27 @@ AUVEST_OUTLINE AUVEST_INLINE Mask<Value> factor_leading(const Matrix<Value, N, N
   return positive;
 }
 
-/// a = L D L' with a unit lower triangular L, in place: D on the diagonal, L below it. Pivots that
-/// are zero to rounding are floored as in factor_leading. False, with `a` left unusable, if `a`
-/// is indefinite or a diagonal element is not positive (or is NaN).
-template <class Value, int N>
-AUVEST_INLINE Mask<Value> ldlt(Matrix<Value, N, N>& a) {
-  Vector<Value, N> floor;
-  Mask<Value> definite = pivot_floors(a, floor);
-  AUVEST_UNROLL
-  for (int k = 0; k < N; ++k) {
-    definite = definite && !(a(k, k) < -(Value(N) * floor(k)));
-    a(k, k) = larger(a(k, k), floor(k));
-    if (k + 1 == N) break;
-    const Value inverse = Value(1) / a(k, k);
-    AUVEST_UNROLL
-    for (int i = N - 1; i > k; --i) {  // upwards: row i needs the unscaled column above it
-      const Value l = a(i, k) * inverse;
-      AUVEST_UNROLL
-      for (int j = k + 1; j <= i; ++j) a(i, j) = a(i, j) - l * a(j, k);
-      a(i, k) = l;
-    }
-  }
-  return definite;
+/// The same for two components and no others.
+template <class Value>
+AUVEST_OUTLINE AUVEST_INLINE Mask<Value> factor_leading(const Matrix<Value, 2, 2>& p,
+                                                        Matrix<Value, 2, 2>& root,
+                                                        Matrix<Value, 1, 2>&) {
+  const Value scaled = p(1, 0) * (Value(1) / p(0, 0));
+  root(0, 0) = sqrt(p(0, 0));
+  root(0, 1) = Value(0);
+  root(1, 0) = scaled * root(0, 0);
+  root(1, 1) = sqrt(larger(p(1, 1) - scaled * p(1, 0), pivot_floor(p(1, 1))));
+  return p(0, 0) > Value(0) && p(1, 1) > Value(0);
 }
 
 /// True if the symmetric matrix (lower triangle) is positive definite to working precision: no
-/// pivot of its Cholesky factorisation is lost in rounding noise.
+/// pivot of its elimination is lost in rounding noise.
 template <class Scalar, int N>
-AUVEST_OUTLINE bool is_positive_definite(const Matrix<Scalar, N, N>& a) {
-  Scalar root[N * (N + 1) / 2];  // lower triangle, row after row
-  Scalar* row = root;
-  for (int i = 0; i < N; ++i) {
-    const Scalar* above = root;
-    for (int j = 0; j < i; ++j) {
-      row[j] = minus_dot(a(i, j), row, above, j) / above[j];
-      above += j + 1;
-    }
-    const Scalar pivot = minus_dot(a(i, i), row, row, i);
-    if (!(pivot > Scalar(N) * machine_epsilon<Scalar>() * a(i, i)) || !is_finite(pivot)) {
-      return false;
-    }
-    row[i] = sqrt(pivot);
-    row += i + 1;
-  }
-  return true;
+AUVEST_OUTLINE bool is_positive_definite(Matrix<Scalar, N, N> a) {
+  Vector<Scalar, N> inverse;
+  const Scalar least = Scalar(N) * machine_epsilon<Scalar>();
+  // A pivot that is not a number makes those after it so.
+  return ldlt(a.data(), N, least, inverse.data()) && is_finite(inverse(N - 1));
 }
 
 /// Lower triangle of Phi P Phi' for a symmetric P given by its lower triangle.

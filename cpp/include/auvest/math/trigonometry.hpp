@@ -20,57 +20,76 @@ namespace auvest {
 namespace math {
 namespace detail {
 
-/// x / (2 pi) modulo 1, in units of 2^-64 turn, for a finite x >= 0.5. Error below 3 units.
+/// product = m a modulo 2^96, both of 12 bytes, most significant byte first. (By bytes: wider
+/// integers take much flash on an 8-bit chip.)
+inline void multiply(const uint8_t* a, uint32_t m, uint8_t* product) {
+  for (uint8_t k = 0; k < 12; ++k) product[k] = 0;
+  for (uint8_t j = 0; j < 4; ++j) {
+    uint8_t carry = 0;
+    for (uint8_t k = static_cast<uint8_t>(12 - j); k-- > 0;) {
+      const uint8_t digit = static_cast<uint8_t>(m);
+      const uint16_t sum = static_cast<uint16_t>(product[k] + a[k + j] * digit + carry);
+      product[k] = static_cast<uint8_t>(sum);
+      carry = static_cast<uint8_t>(sum >> 8);
+    }
+    m >>= 8;
+  }
+}
+
+/// The integer of 4 bytes, most significant byte first.
+AUVEST_OUTLINE inline uint32_t word_of(const uint8_t* bytes) {
+  uint32_t word = 0;
+  for (uint8_t i = 0; i < 4; ++i) word = (word << 8) | bytes[i];
+  return word;
+}
+
+/// A fraction of a turn in units of 2^-64 turn.
+struct Turn {
+  uint32_t high, low;
+};
+
+/// x / (2 pi) modulo 1 for a finite x >= 0.5. Error below 3 units.
 ///
 /// x = m 2^e with a 24-bit integer m. Digits of 1/(2 pi) that meet m above the binary point make
 /// whole turns and are skipped; 96 digits from there on leave 2^-64 of a turn after the product.
-inline uint64_t fraction_of_turn(float x) {
+inline Turn fraction_of_turn(float x) {
   // 1/(2 pi), most significant byte first, after 24 zero bits (the shift of the smallest x).
   static const uint8_t kDigits[] = {0x00, 0x00, 0x00, 0x28, 0xbe, 0x60, 0xdb, 0x93, 0x91, 0x05,
                                     0x4a, 0x7f, 0x09, 0xd5, 0xf4, 0x7d, 0x4d, 0x37, 0x70, 0x36,
                                     0xd8, 0xa5, 0x66, 0x4f, 0x10, 0xe4, 0x10, 0x7f};
   const uint32_t bits = to_bits(x);
-  const uint32_t first = (bits >> 23) - 126u;  // first digit needed, 0..128
+  const uint8_t first = static_cast<uint8_t>((bits >> 23) - 126u);  // first digit needed, 0..128
   const uint32_t m = ((bits & 0x007fffffu) | 0x00800000u) << (first & 7u);
-  const uint8_t* digits = kDigits + (first >> 3);
-  uint32_t word[3];
-  for (uint32_t i = 0; i < 3; ++i) {
-    word[i] = (static_cast<uint32_t>(digits[4 * i]) << 24) |
-              (static_cast<uint32_t>(digits[4 * i + 1]) << 16) |
-              (static_cast<uint32_t>(digits[4 * i + 2]) << 8) |
-              static_cast<uint32_t>(digits[4 * i + 3]);
-  }
-  const uint64_t wide = m;
-  return (static_cast<uint64_t>(m * word[0]) << 32) + wide * word[1] + ((wide * word[2]) >> 32);
+  uint8_t product[12];
+  multiply(kDigits + (first >> 3), m, product);
+  return {word_of(product), word_of(product + 4)};
 }
 
-/// The angle, in rad, of a signed fraction of a turn in units of 2^-64 turn; rounded once, with an
-/// error below 0.54 ulp of the given fraction.
-inline float turn_to_radian(uint64_t turn) {
-  if (turn == 0) return 0.0f;
-  const uint32_t sign = static_cast<uint32_t>(turn >> 32) & 0x80000000u;
-  const uint64_t size = sign != 0 ? ~turn + 1u : turn;
-  uint32_t high = static_cast<uint32_t>(size >> 32);
-  uint32_t low = static_cast<uint32_t>(size);
-  uint32_t exponent = 129;  // of 2^-1 turn = pi rad, before the product's own carry
-  if (high == 0) {
-    high = low;
-    low = 0;
-    exponent -= 32;
+/// The angle, in rad, of a signed fraction of a turn that is not zero (no float comes closer to a
+/// quarter turn than 1.6e-9 rad); rounded once, with an error below 0.54 ulp of the fraction.
+inline float turn_to_radian(Turn turn) {
+  static const uint8_t kTwoPi[12] = {0, 0, 0, 0, 0, 0, 0, 0, 0xc9, 0x0f, 0xda, 0xa2};  // 2^29 2 pi
+  const uint32_t sign = turn.high & 0x80000000u;
+  if (sign != 0) {  // the size, but for one unit
+    turn.high = ~turn.high;
+    turn.low = ~turn.low;
   }
-  while ((high & 0x80000000u) == 0) {
-    high = (high << 1) | (low >> 31);
-    low <<= 1;
+  uint8_t exponent = 129;  // of 2^-1 turn = pi rad, before the product's own carry
+  while ((turn.high & 0x80000000u) == 0) {
+    turn.high = (turn.high << 1) | (turn.low >> 31);
+    turn.low <<= 1;
     --exponent;
   }
-  // 2 pi = 0xc90fdaa2 * 2^-29; the product has its leading one in bit 31 or 30.
-  uint32_t product = static_cast<uint32_t>((static_cast<uint64_t>(high) * 0xc90fdaa2u) >> 32);
+  uint8_t bytes[12];
+  multiply(kTwoPi, turn.high, bytes);
+  uint32_t product = word_of(bytes + 4);  // the leading one is bit 31 or 30
   if ((product & 0x80000000u) == 0) {
     product <<= 1;
     --exponent;
   }
   // The rounding carry, if any, moves into the exponent, as it must.
-  return from_bits(sign | (((exponent - 1u) << 23) + (product >> 8) + ((product >> 7) & 1u)));
+  const uint32_t rounded = (product >> 8) + ((product & 0x80u) != 0 ? 1u : 0u);
+  return from_bits(sign | ((static_cast<uint32_t>(exponent - 1) << 23) + rounded));
 }
 
 /// sin(x) for |x| <= pi/4. The sign of a zero is lost.
@@ -105,64 +124,78 @@ AUVEST_INLINE Value reduce_near(const Value& x, Value& shifted) {
   return high + (lost - k * Value(2.56334407e-12f));
 }
 
-/// P(z^2) of atan(z) = z + z^3 P(z^2), |z| <= 1, from u = z^2. The terms alternate in sign: added
-/// in pairs they stay small.
+/// c[0] + c[1] u + c[2] u^2 + ... for an even count of coefficients, in pairs of neighbouring
+/// terms: where they alternate in sign the sums stay small.
+template <class Value>
+AUVEST_INLINE Value paired_polynomial(const float* c, int count, Value u) {
+  const Value v = u * u;
+  c += count;
+  Value p = Value(0.0f);
+  AUVEST_UNROLL
+  for (int i = 0; i < count; i += 2) {
+    c -= 2;
+    const Value pair = Value(c[0]) + u * Value(c[1]);
+    p = pair + v * p;
+  }
+  return p;
+}
+
+/// P(z^2) of atan(z) = z + z^3 P(z^2), |z| <= 1, from u = z^2.
 template <class Value>
 AUVEST_INLINE Value atan_polynomial(const Value& u) {
   static const float kPolynomial[8] = {-3.33331525e-01f, 1.99937671e-01f,  -1.42110020e-01f,
                                        1.06657691e-01f,  -7.55166039e-02f, 4.32047322e-02f,
                                        -1.63631924e-02f, 2.91942270e-03f};
-  const Value v = u * u;
-  Value p = Value(kPolynomial[6]) + u * Value(kPolynomial[7]);
-  AUVEST_UNROLL
-  for (int i = 4; i >= 0; i -= 2) {
-    p = (Value(kPolynomial[i]) + u * Value(kPolynomial[i + 1])) + v * p;
-  }
-  return p;
+  return paired_polynomial(kPolynomial, 8, u);
 }
 
 /// The x in [-pi/4, pi/4] (plus a few ulp) and the number of quarter turns, modulo 4, that make up
 /// a finite angle.
 struct ReducedAngle {
   float angle_rad;
-  uint32_t quarter;
+  uint8_t quarter;
 };
 
-inline ReducedAngle reduce_quarter(float x) {
+/// For |x| <= 96.
+AUVEST_INLINE ReducedAngle reduce_quarter_near(float x) {
   ReducedAngle reduced;
-  const float size = absolute(x);
-  if (size <= 96.0f) {
-    float shifted;
-    reduced.angle_rad = reduce_near(x, shifted);
-    reduced.quarter = to_bits(shifted) & 3u;
-    return reduced;
-  }
-  const uint64_t turn = fraction_of_turn(size);
-  const uint64_t quarter = (turn + (static_cast<uint64_t>(1) << 61)) >> 62;
-  const float angle = turn_to_radian(turn - (quarter << 62));
-  const uint32_t count = static_cast<uint32_t>(quarter);
-  const bool negative = (to_bits(x) & 0x80000000u) != 0;
-  reduced.angle_rad = negative ? -angle : angle;
-  reduced.quarter = (negative ? 0u - count : count) & 3u;
+  float shifted;
+  reduced.angle_rad = reduce_near(x, shifted);
+  reduced.quarter = static_cast<uint8_t>(to_bits(shifted) & 3u);
   return reduced;
 }
 
-/// atan2() where |y / x| or |x / y|, whichever is smaller, is below 2^-100 or not a number.
-inline float atan2_rare(float y, float x) {
-  if (is_nan(x) || is_nan(y)) return quiet_nan();
-  const float size_x = absolute(x);
-  const float size_y = absolute(y);
-  const bool left = (to_bits(x) & 0x80000000u) != 0;
-  if (size_x == size_y) {  // two zeros or two infinities
-    if (size_x == 0.0f) return copy_sign(left ? pi<float>() : 0.0f, y);
-    return copy_sign(left ? 2.35619449f : 0.785398163f, y);
-  }
-  if (size_y > size_x) return copy_sign(half_pi<float>(), y);
-  if (left) return copy_sign(pi<float>(), y);
-  // The quotient may be subnormal, where not every target's division rounds correctly.
-  const float scaled = size_y * 1.84467441e+19f / size_x;       // times 2^64
-  if (!(scaled >= 1.29246971e-26f)) return copy_sign(0.0f, y);  // 2^-86; NaN if x is infinite
-  return copy_sign(scale_by_power(scaled, -64), y);
+inline ReducedAngle reduce_quarter(float x) {
+  const float size = absolute(x);
+  if (size <= 96.0f) return reduce_quarter_near(x);
+  Turn turn = fraction_of_turn(size);
+  const uint32_t count = (turn.high + 0x20000000u) >> 30;
+  turn.high -= count << 30;
+  const float angle = turn_to_radian(turn);
+  const bool negative = (to_bits(x) & 0x80000000u) != 0;
+  ReducedAngle reduced;
+  reduced.angle_rad = negative ? -angle : angle;
+  reduced.quarter = static_cast<uint8_t>((negative ? 0u - count : count) & 3u);
+  return reduced;
+}
+
+/// Sine and cosine of a reduced angle. The sign of a zero is lost.
+AUVEST_INLINE void sincos_reduced(const ReducedAngle& r, float& s, float& c) {
+  const float sine = sin_kernel(r.angle_rad);
+  const float cosine = cos_kernel(r.angle_rad);
+  const bool odd = (r.quarter & 1u) != 0;
+  s = odd ? cosine : sine;
+  c = odd ? sine : cosine;
+  if ((r.quarter & 2u) != 0) s = -s;
+  if (((r.quarter + 1u) & 2u) != 0) c = -c;
+}
+
+/// y / x for 0 <= y < x 2^-100 (or y = 0 = x): the quotient may be subnormal, where not every
+/// target's division rounds correctly.
+inline float tiny_quotient(float y, float x) {
+  const float scaled = y * 1.84467441e+19f / x;   // times 2^64
+  if (!(scaled >= 1.29246971e-26f)) return 0.0f;  // 2^-86; NaN if x is 0 or infinite
+  return scale_by_power(scaled, -64);
 }
 
 /// The double functions, by the size of double.
@@ -283,6 +316,12 @@ inline float cos(float x) {
   return ((r.quarter + 1u) & 2u) != 0 ? -c : c;
 }
 
+/// s = sin(x), c = cos(x) for |x| <= 96: the same bits as the two functions, except that the sign
+/// of a zero is lost.
+AUVEST_INLINE void sincos_near(float x, float& s, float& c) {
+  detail::sincos_reduced(detail::reduce_quarter_near(x), s, c);
+}
+
 /// s = sin(x), c = cos(x), the same bits as the two functions.
 inline void sincos(float x, float& s, float& c) {
   const uint32_t size = to_bits(x) & 0x7fffffffu;
@@ -293,46 +332,39 @@ inline void sincos(float x, float& s, float& c) {
   }
   detail::ReducedAngle r = {x, 0};
   if (size > 0x3f490fdbu) r = detail::reduce_quarter(x);
-  const float sine = size < 0x39800000u ? x : detail::sin_kernel(r.angle_rad);
-  const float cosine = detail::cos_kernel(r.angle_rad);
-  const bool odd = (r.quarter & 1u) != 0;
-  const float a = odd ? cosine : sine;
-  const float b = odd ? sine : cosine;
-  s = (r.quarter & 2u) != 0 ? -a : a;
-  c = ((r.quarter + 1u) & 2u) != 0 ? -b : b;
+  detail::sincos_reduced(r, s, c);
+  if (size < 0x39800000u) s = x;
 }
 
 /// The angle of the point (x, y) in rad, in [-pi, pi], with C99's results for signed zeros and
 /// infinities. A NaN gives NaN.
 AUVEST_OUTLINE AUVEST_INLINE float atan2(float y, float x) {
-  // By octant: pi/2 or pi, in two parts, plus or minus atan(z).
-  struct Octant {
-    float high, low;
-    uint32_t sign;
-  };
-  static const Octant kOctant[4] = {
-      {0.0f, 0.0f, 0u},
-      {1.57079637f, -4.37113883e-08f, 0x80000000u},
-      {3.14159274f, -8.74227766e-08f, 0x80000000u},
-      {1.57079637f, -4.37113883e-08f, 0u},
-  };
   const float size_x = absolute(x);
   const float size_y = absolute(y);
-  const float small = size_x < size_y ? size_x : size_y;
-  const float large = size_y > size_x ? size_y : size_x;
-  const float ratio = small / large;
-  const uint32_t ratio_bits = to_bits(ratio);
-  // Outside [2^-100, 1], or NaN.
-  if (ratio_bits - 0x0d800000u > 0x3f800000u - 0x0d800000u) return detail::atan2_rare(y, x);
-  const Octant& o = kOctant[(size_y > size_x ? 1u : 0u) + (x < 0.0f ? 2u : 0u)];
-  const float z = from_bits(ratio_bits ^ o.sign);
-  // Below 2^-12 z^3 / 3 is less than a sixth of an ulp of z; powers of z would become subnormal.
-  float tail = o.low;
-  if (ratio_bits >= 0x39800000u) {
-    const float u = ratio * ratio;
-    tail = o.low + z * (u * detail::atan_polynomial(u));
+  const bool steep = size_y > size_x;
+  const bool left = (to_bits(x) & 0x80000000u) != 0;
+  float ratio = steep ? size_x / size_y : size_y / size_x;
+  if (size_x == size_y) ratio = size_x > 0.0f ? 1.0f : 0.0f;  // also two zeros or two infinities
+  if (is_nan(ratio)) return quiet_nan();
+  // By octant: 0, pi/2 or pi, in two parts, plus or minus atan(ratio).
+  float high = 0.0f;
+  float tail = 0.0f;
+  if (steep) {
+    high = 1.57079637f;
+    tail = -4.37113883e-08f;
+  } else if (left) {
+    high = 3.14159274f;
+    tail = -8.74227766e-08f;
+  } else if (to_bits(ratio) < 0x0d800000u) {  // 2^-100
+    return copy_sign(detail::tiny_quotient(size_y, size_x), y);
   }
-  return copy_sign((o.high + z) + tail, y);
+  const float z = steep != left ? -ratio : ratio;
+  // Below 2^-12 z^3 / 3 is less than a sixth of an ulp of z; powers of z would become subnormal.
+  if (to_bits(ratio) >= 0x39800000u) {
+    const float u = ratio * ratio;
+    tail = tail + z * (u * detail::atan_polynomial(u));
+  }
+  return copy_sign((high + z) + tail, y);
 }
 
 inline double sin(double x) { return detail::DoubleTrigonometry<sizeof(double)>::sin(x); }
@@ -340,6 +372,7 @@ inline double cos(double x) { return detail::DoubleTrigonometry<sizeof(double)>:
 inline void sincos(double x, double& s, double& c) {
   detail::DoubleTrigonometry<sizeof(double)>::sincos(x, s, c);
 }
+inline void sincos_near(double x, double& s, double& c) { sincos(x, s, c); }
 AUVEST_INLINE double atan2(double y, double x) {
   return detail::DoubleTrigonometry<sizeof(double)>::atan2(y, x);
 }

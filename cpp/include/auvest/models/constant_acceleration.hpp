@@ -41,7 +41,7 @@ struct ConstantAcceleration : ProcessModel<ConstantAcceleration<Scalar_, Order>,
   /// Eq. (4): x(k+1) = Phi(dt) x(k).
   State f(const State& x, Scalar dt) const {
     State next = x;
-    shift(next, Coefficients(dt));
+    advance(next.data(), 6, Coefficients(dt));
     return next;
   }
 
@@ -70,28 +70,23 @@ struct ConstantAcceleration : ProcessModel<ConstantAcceleration<Scalar_, Order>,
   }
 
   /// x <- Phi x, P <- Phi P Phi' + Q in place. Row by row, every element is formed from elements
-  /// further down or to the right, which still hold their old values.
+  /// further down or to the right, which still hold their old values. The upper triangle has no
+  /// meaning afterwards.
   template <class Value>
-  AUVEST_OUTLINE void propagate(Belief<Value, 6>& belief, Scalar dt) const {
+  AUVEST_INLINE void propagate(Belief<Value, 6>& belief, Scalar dt) const {
     const Coefficients c(dt);
     Matrix<Value, 6, 6>& p = belief.P;
+    math::mirror_lower(p);
     AUVEST_UNROLL
     for (int i = 0; i < 6; ++i) {
-      Value row[6];  // of Phi P
-      AUVEST_UNROLL
-      for (int j = 0; j < 6; ++j) {
-        if (j <= i + 2 * Order) row[j] = column(p, i, j, c);
-      }
-      AUVEST_UNROLL
-      for (int j = 0; j <= i; ++j) {
-        Value value = row[j];
-        if (j + 2 < 6) value = value + c.first * row[j + 2];
-        if (Order == 2 && j + 4 < 6) value = value + c.second * row[j + 4];
-        p(i, j) = value;
-      }
+      Value* const row = &p(i, 0);
+      const int count = i + 1 + 2 * Order < 6 ? i + 1 + 2 * Order : 6;
+      if (i < 4) math::add_scaled(Value(c.first), row + 12, row, count);
+      if (Order == 2 && i < 2) math::add_scaled(Value(c.second), row + 24, row, count);
+      advance(row, i + 1, c);
     }
     add_noise(p, dt);
-    shift(belief.x, c);
+    advance(belief.x.data(), 6, c);
   }
 
   /// P_xx + P_yy after dt seconds, without forming the rest of P.
@@ -120,15 +115,12 @@ struct ConstantAcceleration : ProcessModel<ConstantAcceleration<Scalar_, Order>,
     explicit Coefficients(Scalar dt) : first(dt), second(Scalar(0.5) * dt * dt) {}
   };
 
-  /// x <- Phi x: each element needs those behind it, which still hold their old values.
+  /// The first `count` components of v <- Phi v: each needs those behind it, which still hold their
+  /// old values.
   template <class Value>
-  static AUVEST_INLINE void shift(Vector<Value, 6>& x, const Coefficients& c) {
-    AUVEST_UNROLL
-    for (int i = 0; i < 4; ++i) {
-      Value value = x(i) + c.first * x(i + 2);
-      if (Order == 2 && i < 2) value = value + c.second * x(i + 4);
-      x(i) = value;
-    }
+  static AUVEST_INLINE void advance(Value* v, int count, const Coefficients& c) {
+    math::add_scaled(Value(c.first), v + 2, v, count < 4 ? count : 4);
+    if (Order == 2) math::add_scaled(Value(c.second), v + 4, v, count < 2 ? count : 2);
   }
 
   /// Element (i, j) of Phi P, from the lower triangle of P.
@@ -153,6 +145,13 @@ struct ConstantAcceleration : ProcessModel<ConstantAcceleration<Scalar_, Order>,
                  dt2 * (params.velocity / Scalar(3) + dt2 * (params.acceleration / Scalar(20))));
   }
 
+  /// Adds a variance to an element of the diagonal and to the next one: x and y.
+  template <class Value>
+  static AUVEST_OUTLINE AUVEST_INLINE void add_to_pair(Value* diagonal, Scalar variance) {
+    diagonal[0] = diagonal[0] + variance;
+    diagonal[7] = diagonal[7] + variance;
+  }
+
   template <class Value>
   AUVEST_INLINE void add_noise(Matrix<Value, 6, 6>& p, Scalar dt) const {
     const Scalar q_v = params.velocity;
@@ -161,12 +160,12 @@ struct ConstantAcceleration : ProcessModel<ConstantAcceleration<Scalar_, Order>,
     const Scalar pp = position_noise(dt);
     const Scalar vv = Order == 1 ? q_v * dt : dt * (q_v + dt2 * (q_a / Scalar(3)));
     const Scalar aa = q_a * dt;
-    AUVEST_UNROLL
-    for (int i = 0; i < 2; ++i) {
-      p(i, i) = p(i, i) + pp;
-      p(i + 2, i + 2) = p(i + 2, i + 2) + vv;
-      p(i + 4, i + 4) = p(i + 4, i + 4) + aa;
-      if (Order == 2) {
+    add_to_pair(&p(0, 0), pp);
+    add_to_pair(&p(2, 2), vv);
+    add_to_pair(&p(4, 4), aa);
+    if (Order == 2) {
+      AUVEST_UNROLL
+      for (int i = 0; i < 2; ++i) {
         p(i + 2, i) = p(i + 2, i) + dt2 * (q_v / Scalar(2) + dt2 * (q_a / Scalar(8)));
         p(i + 4, i) = p(i + 4, i) + dt2 * dt * (q_a / Scalar(6));
         p(i + 4, i + 2) = p(i + 4, i + 2) + dt2 * (q_a / Scalar(2));

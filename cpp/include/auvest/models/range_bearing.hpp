@@ -53,10 +53,11 @@ struct RangeBearing : MeasurementModel<RangeBearing<Scalar_, N>, Scalar_, N, 2, 
 
   Params params;
 
-  explicit RangeBearing(const Params& p = Params()) : params(p) {}
+  explicit constexpr RangeBearing(const Params& p = Params()) : params(p) {}
 
   struct Expansion {
-    Scalar dx, dy, square, range, inverse_square;
+    Scalar offset[2];  // D
+    Scalar square, range, inverse_square;
     Measurement centre;
 
     const Measurement& value() const { return centre; }
@@ -64,20 +65,19 @@ struct RangeBearing : MeasurementModel<RangeBearing<Scalar_, N>, Scalar_, N, 2, 
     Jacobian H() const {
       const Scalar inverse = Scalar(1) / range;
       Jacobian jacobian;
-      jacobian(0, 0) = dx * inverse;
-      jacobian(0, 1) = dy * inverse;
-      jacobian(1, 0) = -(dy * inverse_square);
-      jacobian(1, 1) = dx * inverse_square;
+      jacobian(0, 0) = offset[0] * inverse;
+      jacobian(0, 1) = offset[1] * inverse;
+      jacobian(1, 0) = -(offset[1] * inverse_square);
+      jacobian(1, 1) = offset[0] * inverse_square;
       return jacobian;
     }
 
     AUVEST_INLINE void deviations(const ObservedState& e, Measurement& sum,
                                   Measurement& difference) const {
       using math::atan2;
-      using math::sqrt;
       const Scalar one = Scalar(1);
-      const Scalar p = (dx * e(0) + dy * e(1)) * inverse_square;
-      const Scalar q = (dx * e(1) - dy * e(0)) * inverse_square;
+      const Scalar p = math::dot(offset, e.data(), 2) * inverse_square;
+      const Scalar q = math::cross(offset, e.data()) * inverse_square;
       const Scalar two_q = q + q;
       const Scalar two_range = range + range;
       const Scalar pp = p * p;
@@ -91,17 +91,22 @@ struct RangeBearing : MeasurementModel<RangeBearing<Scalar_, N>, Scalar_, N, 2, 
         return;
       }
       const Scalar w = one - uu;
-      const Scalar a_plus = sqrt((one + p) * (one + p) + qq);
-      const Scalar a_minus = sqrt((one - p) * (one - p) + qq);
+      const Scalar a_plus = length(one + p, qq);
+      const Scalar a_minus = length(one - p, qq);
       const Scalar a_sum = a_plus + a_minus;
       const Scalar a_product = a_plus * a_minus;
-      const bool inside = w > Scalar(0);
-      const Scalar numerator = inside ? two_q * two_q : a_product - w;
-      const Scalar denominator = inside ? (a_product + w) * (a_sum + Scalar(2)) : a_sum + Scalar(2);
-      sum(0) = two_range * numerator / denominator;  // 2 |D| g / (a+ + a- + 2)
+      Scalar g = a_product - w;
+      if (w > Scalar(0)) g = two_q * two_q / (a_product + w);
+      sum(0) = two_range * g / (a_sum + Scalar(2));
       difference(0) = two_range * (p + p) / a_sum;
       sum(1) = atan2(-(p * two_q), (one - pp) + qq);
       difference(1) = atan2(two_q, w);
+    }
+
+   private:
+    /// |1 + u|, from 1 + p and q^2.
+    static AUVEST_INLINE Scalar length(Scalar one_p, Scalar qq) {
+      return math::sqrt(one_p * one_p + qq);
     }
   };
 
@@ -109,13 +114,13 @@ struct RangeBearing : MeasurementModel<RangeBearing<Scalar_, N>, Scalar_, N, 2, 
     using math::atan2;
     using math::sqrt;
     Expansion point;
-    point.dx = x(0) - params.station_x_m;
-    point.dy = x(1) - params.station_y_m;
-    point.square = point.dx * point.dx + point.dy * point.dy;
+    point.offset[0] = x(0) - params.station_x_m;
+    point.offset[1] = x(1) - params.station_y_m;
+    point.square = math::dot(point.offset, point.offset, 2);
     point.range = sqrt(point.square);
     point.inverse_square = Scalar(1) / point.square;
     point.centre(0) = point.range;
-    point.centre(1) = atan2(point.dy, point.dx);
+    point.centre(1) = atan2(point.offset[1], point.offset[0]);
     return point;
   }
 
@@ -153,7 +158,7 @@ struct RangeBearing : MeasurementModel<RangeBearing<Scalar_, N>, Scalar_, N, 2, 
   AUVEST_INLINE bool near_field(const Expansion& point, const Matrix<Scalar, N, N>& P,
                                 const Measurement& z, Measurement& innovation, Noise& noise) const {
     const Scalar reach = params.near_field * params.near_field * (P(0, 0) + P(1, 1));
-    if (!(point.square <= reach) && point.square > Scalar(1e-30)) return false;
+    if (point.square > reach + Scalar(1e-30)) return false;
     as_position(point, z, innovation, noise);
     return true;
   }
@@ -167,20 +172,21 @@ struct RangeBearing : MeasurementModel<RangeBearing<Scalar_, N>, Scalar_, N, 2, 
   }
 
  private:
-  AUVEST_OUTLINE void as_position(const Expansion& point, const Measurement& z,
-                                  Measurement& innovation, Noise& noise) const {
+  AUVEST_INLINE void as_position(const Expansion& point, const Measurement& z,
+                                 Measurement& innovation, Noise& noise) const {
     Scalar sine, cosine;
-    math::sincos(z(1), sine, cosine);
+    math::sincos_near(math::wrap(z(1)), sine, cosine);
     const Scalar range2 = z(0) * z(0);
     const Scalar var_range = params.sigma_range_m * params.sigma_range_m;
     const Scalar var_bearing = params.sigma_bearing_rad * params.sigma_bearing_rad;
-    const Scalar along = var_range + Scalar(0.75) * range2 * var_bearing * var_bearing;
-    const Scalar across = (range2 + var_range) * var_bearing;
-    innovation(0) = z(0) * cosine - point.dx;
-    innovation(1) = z(0) * sine - point.dy;
-    noise(0, 0) = along * cosine * cosine + across * sine * sine;
-    noise(1, 0) = noise(0, 1) = (along - across) * cosine * sine;
-    noise(1, 1) = along * sine * sine + across * cosine * cosine;
+    const Scalar along = math::sqrt(var_range + Scalar(0.75) * range2 * var_bearing * var_bearing);
+    const Scalar across = math::sqrt((range2 + var_range) * var_bearing);
+    const Scalar root[2][2] = {{along * cosine, -(across * sine)}, {along * sine, across * cosine}};
+    innovation(0) = z(0) * cosine - point.offset[0];
+    innovation(1) = z(0) * sine - point.offset[1];
+    for (int i = 0; i < 2; ++i) {
+      for (int j = 0; j < 2; ++j) noise(i, j) = math::dot(root[i], root[j], 2);
+    }
   }
 };
 

@@ -22,6 +22,7 @@ inline void sincos(float x, float& s, float& c) {
   s = sin(x);
   c = cos(x);
 }
+inline void sincos_near(float x, float& s, float& c) { sincos(x, s, c); }
 
 }  // namespace math
 }  // namespace auvest
