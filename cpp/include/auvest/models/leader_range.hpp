@@ -20,6 +20,15 @@
 
 namespace auvest {
 
+/// Whatever the number of states.
+template <class Scalar>
+struct LeaderRangeParams {
+  Scalar leader_x_m = Scalar(0);
+  Scalar leader_y_m = Scalar(0);
+  Scalar sigma_range_m = Scalar(1);   ///< s_e, Eq. (5)
+  Scalar sigma_leader_m = Scalar(0);  ///< of the leader's position, per axis
+};
+
 template <class Scalar_, int N>
 struct LeaderRange : MeasurementModel<LeaderRange<Scalar_, N>, Scalar_, N, 1, 2> {
   using Base = MeasurementModel<LeaderRange<Scalar_, N>, Scalar_, N, 1, 2>;
@@ -31,20 +40,15 @@ struct LeaderRange : MeasurementModel<LeaderRange<Scalar_, N>, Scalar_, N, 1, 2>
   using typename Base::State;
   static constexpr bool kClosedForm = true;
 
-  struct Params {
-    Scalar leader_x_m = Scalar(0);
-    Scalar leader_y_m = Scalar(0);
-    Scalar sigma_range_m = Scalar(1);   ///< s_e, Eq. (5)
-    Scalar sigma_leader_m = Scalar(0);  ///< of the leader's position, per axis
-  };
+  using Params = LeaderRangeParams<Scalar>;
 
   Params params;
 
   explicit LeaderRange(const Params& p = Params()) : params(p) {}
 
   struct Expansion {
-    Scalar range;
-    Scalar ux, uy;  // unit vector from the leader; 0 at the leader
+    Scalar range, inverse;  // inverse: 1 / range; 0 at the leader
+    Scalar ux, uy;          // unit vector from the leader; 0 at the leader
     Measurement centre;
 
     const Measurement& value() const { return centre; }
@@ -61,9 +65,8 @@ struct LeaderRange : MeasurementModel<LeaderRange<Scalar_, N>, Scalar_, N, 1, 2>
                                   Measurement& difference) const {
       using math::sqrt;
       const Scalar one = Scalar(1);
-      const Scalar scale = range > Scalar(1e-15) ? one / range : Scalar(0);
-      const Scalar p = (ux * e(0) + uy * e(1)) * scale;
-      const Scalar q = (ux * e(1) - uy * e(0)) * scale;
+      const Scalar p = (ux * e(0) + uy * e(1)) * inverse;
+      const Scalar q = (ux * e(1) - uy * e(0)) * inverse;
       const Scalar qq = q * q;
       const Scalar uu = p * p + qq;
       if (uu < Scalar(0.25) * math::machine_epsilon<Scalar>()) {
@@ -90,9 +93,9 @@ struct LeaderRange : MeasurementModel<LeaderRange<Scalar_, N>, Scalar_, N, 1, 2>
     Expansion point;
     point.range = sqrt(dx * dx + dy * dy);
     point.centre(0) = point.range;
-    const Scalar inverse = point.range > Scalar(1e-15) ? Scalar(1) / point.range : Scalar(0);
-    point.ux = dx * inverse;
-    point.uy = dy * inverse;
+    point.inverse = point.range > Scalar(1e-15) ? Scalar(1) / point.range : Scalar(0);
+    point.ux = dx * point.inverse;
+    point.uy = dy * point.inverse;
     return point;
   }
 
@@ -110,10 +113,9 @@ struct LeaderRange : MeasurementModel<LeaderRange<Scalar_, N>, Scalar_, N, 1, 2>
 
   void second_order(const Expansion& point, const Matrix<Scalar, 2, 2>& root,
                     Measurement& innovation, Noise& noise) const {
-    if (!(point.range > Scalar(1e-15))) return;
     const Scalar first = point.ux * root(1, 0) - point.uy * root(0, 0);  // L' n, n = (-uy, ux)
     const Scalar second = point.ux * root(1, 1);
-    const Scalar bend = (first * first + second * second) / (point.range + point.range);
+    const Scalar bend = (first * first + second * second) * (Scalar(0.5) * point.inverse);
     innovation(0) = innovation(0) - bend;
     noise(0, 0) = noise(0, 0) + (bend + bend) * bend;
   }

@@ -22,6 +22,16 @@
 
 namespace auvest {
 
+/// Of the model in all its sizes.
+template <class Scalar>
+struct SpeedHeadingParams {
+  Scalar sigma_forward = Scalar(0.1);        ///< s_v [m/s/sqrt(Hz)], Eq. (2)
+  Scalar sigma_starboard = Scalar(0);        ///< [m/s/sqrt(Hz)]
+  Scalar sigma_heading = Scalar(0.0174533);  ///< s_th [rad/sqrt(Hz)], Eq. (2); 1 deg
+  Scalar bias_walk = Scalar(1e-4);           ///< of the heading bias [rad/sqrt(s)]
+  Scalar scale_walk = Scalar(1e-4);          ///< of the speed scale [1/sqrt(s)]
+};
+
 template <class Scalar_, bool HeadingBias = false, bool SpeedScale = false>
 struct SpeedHeading : ProcessModel<SpeedHeading<Scalar_, HeadingBias, SpeedScale>, Scalar_,
                                    2 + int(HeadingBias) + int(SpeedScale)> {
@@ -34,13 +44,7 @@ struct SpeedHeading : ProcessModel<SpeedHeading<Scalar_, HeadingBias, SpeedScale
   using Input = Vector<Scalar, 3>;  ///< forward speed, starboard speed (m/s), heading (rad)
   static constexpr bool kLinear = kStates == 2;
 
-  struct Params {
-    Scalar sigma_forward = Scalar(0.1);        ///< s_v [m/s/sqrt(Hz)], Eq. (2)
-    Scalar sigma_starboard = Scalar(0);        ///< [m/s/sqrt(Hz)]
-    Scalar sigma_heading = Scalar(0.0174533);  ///< s_th [rad/sqrt(Hz)], Eq. (2); 1 deg
-    Scalar bias_walk = Scalar(1e-4);           ///< of the heading bias [rad/sqrt(s)]
-    Scalar scale_walk = Scalar(1e-4);          ///< of the speed scale [1/sqrt(s)]
-  };
+  using Params = SpeedHeadingParams<Scalar>;
 
   Params params;
   Input input;

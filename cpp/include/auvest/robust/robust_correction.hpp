@@ -19,7 +19,7 @@ enum class Decision : std::uint8_t {
 template <class Scalar, int M>
 struct RobustCorrection : Correction<Scalar, M> {
   Decision decision;
-  std::uint8_t iterations;         ///< weighted solutions taken; 1: the plain one was final
+  std::uint8_t iterations;         ///< until the weights were final; innovations take 1
   bool recovered;                  ///< the recovery policy widened the belief after this update
   Vector<Scalar, M> standardised;  ///< the residuals that the weights belong to [sigma]
   Vector<Scalar, M> weight;        ///< of each component, 0..1

@@ -8,7 +8,8 @@
 // In the coordinates of square_root_update.hpp the prior is y ~ N(0, I) and the measurement
 // innovation = A y + e, e ~ N(0, E). Minimising with weights w is the plain update with the
 // variances E_mm / w_m, so nothing is solved twice in two ways: each iteration is Potter's update
-// from the same prior. A component of weight 0 is left out.
+// from the same prior. A component of weight 0 is left out. The weights of innovations do not
+// depend on the solution, so that form takes one.
 //
 // Differs from Eqs. (9)-(19): the print does not whiten, here both blocks are (by L and by E), as
 // the thresholds of Eq. (20) in multiples of sigma require. Only the measurement is weighted, the
@@ -39,8 +40,8 @@ struct RobustUpdate {
 
   struct Params {
     Residual residual = Residual::kInnovation;
-    std::uint8_t max_iterations = 10;  ///< solutions taken, >= 2; kInnovation needs no more than 2
-    Scalar tolerance = Scalar(1e-3);   ///< >= 0: stop where no weight changes by more than this
+    std::uint8_t max_iterations = 10;  ///< of kPostFit, >= 2; kInnovation takes one
+    Scalar tolerance = Scalar(1e-3);   ///< of kPostFit, >= 0: stop where no weight changes by more
   };
 
   Kernel kernel;
@@ -53,28 +54,28 @@ struct RobustUpdate {
 
   /// A rule of GaussianFilter; arguments and statuses as those of SquareRootUpdate.
   template <int M, int O, int U, int N>
-  AUVEST_INLINE Status operator()(Belief<Scalar, N>& belief, const Matrix<Scalar, O, O>& root,
+  AUVEST_INLINE Status operator()(Belief<Scalar, N>& belief, Matrix<Scalar, O, O>& root,
                                   const Matrix<Scalar, U, O>& slope, Matrix<Scalar, M, O>& a,
                                   Matrix<Scalar, M, M>& noise,
                                   RobustCorrection<Scalar, M>& correction) {
     innovation_covariance(a, noise, correction.S);
-    for (int m = 0; m < M; ++m) correction.weight(m) = Scalar(1);
-
-    Posterior<Scalar, O> posterior;
-    do {
-      const Status status = solve(a, noise, correction, posterior);
-      if (status != Status::kOk) return status;
-      ++correction.iterations;
-    } while (correction.iterations < params.max_iterations &&
-             reweight(a, noise, posterior.y, correction) &&
-             correction.decision != Decision::kRejected);
-    if (correction.decision != Decision::kRejected) {
-      Matrix<Scalar, O, O> moved;  // the recovery policy needs the prior's root
-      math::copy(root, moved);
-      if (!move_belief(belief, moved, slope, posterior)) return Status::kOverflow;
+    Status status = Status::kOk;
+    if (params.residual == Residual::kInnovation) {
+      correction.iterations = 1;
+      for (int m = 0; m < M; ++m)
+        judge(m, correction.innovation(m), correction.S(m, m), correction);
+    } else {
+      status = settle(a, noise, correction);
     }
-    correction.recovered = recovery.after(correction, a, root, belief);
-    return Status::kOk;
+    decide(correction);
+    if (status == Status::kOk && correction.decision == Decision::kAccepted) {
+      status = correct_belief(belief, root, slope, a, noise, correction);
+    } else if (status == Status::kOk) {
+      status = correct_weighted(belief, root, slope, a, noise, correction);
+    }
+    // Without a weight of 0 the policy does not look at `a` and `root`, which are used up then.
+    if (status == Status::kOk) correction.recovered = recovery.after(correction, a, root, belief);
+    return status;
   }
 
   Status check() const {
@@ -85,16 +86,97 @@ struct RobustUpdate {
   }
 
  private:
-  /// The posterior of the coordinates with the weights of `correction`. The NIS is that of the
-  /// first solution, where all weights are 1.
+  /// Weight of component m from its residual with this variance.
+  template <int M>
+  void judge(int m, Scalar residual, Scalar variance,
+             RobustCorrection<Scalar, M>& correction) const {
+    using math::sqrt;
+    correction.standardised(m) = residual / sqrt(variance);
+    correction.weight(m) = kernel.weight(correction.standardised(m));
+  }
+
+  template <int M>
+  static void decide(RobustCorrection<Scalar, M>& correction) {
+    bool all_full = true;
+    bool all_zero = true;
+    for (int m = 0; m < M; ++m) {
+      all_full = all_full && !(correction.weight(m) < Scalar(1));
+      all_zero = all_zero && !(correction.weight(m) > Scalar(0));
+    }
+    correction.decision = all_full   ? Decision::kAccepted
+                          : all_zero ? Decision::kRejected
+                                     : Decision::kDownweighted;
+  }
+
+  /// The weights of post-fit residuals: solved and judged in turn until they stay.
   template <int M, int O>
-  static Status solve(const Matrix<Scalar, M, O>& a, const Matrix<Scalar, M, M>& noise,
-                      RobustCorrection<Scalar, M>& correction, Posterior<Scalar, O>& posterior) {
+  Status settle(const Matrix<Scalar, M, O>& a, const Matrix<Scalar, M, M>& noise,
+                RobustCorrection<Scalar, M>& correction) const {
+    for (int m = 0; m < M; ++m) correction.weight(m) = Scalar(1);
+    bool settled = false;
+    while (!settled) {
+      Matrix<Scalar, M, O> rows;
+      Matrix<Scalar, M, M> e;
+      Vector<Scalar, M> innovation;
+      weigh(a, noise, correction, rows, e, innovation);
+      if (!math::ldlt(e)) return Status::kNotPositiveDefinite;
+      Posterior<Scalar, O> posterior;
+      if (!potter(rows, e, innovation, posterior)) return Status::kOverflow;
+      ++correction.iterations;
+      if (correction.iterations >= params.max_iterations) break;
+      const Vector<Scalar, M> before = correction.weight;
+      settled = true;
+      bool all_zero = true;
+      for (int m = 0; m < M; ++m) {
+        judge(m, math::minus_dot(correction.innovation(m), &a(m, 0), posterior.y.data(), O),
+              noise(m, m), correction);
+        const Scalar change = correction.weight(m) - before(m);
+        settled = settled && !(change > params.tolerance || -change > params.tolerance);
+        all_zero = all_zero && !(correction.weight(m) > Scalar(0));
+      }
+      if (settled) math::copy(before, correction.weight);
+      settled = settled || all_zero;
+    }
+    return Status::kOk;
+  }
+
+  /// The update with the weights as they are, if one is not 1. The NIS is that of the plain update.
+  template <int M, int O, int U, int N>
+  AUVEST_OUTLINE AUVEST_INLINE static Status correct_weighted(
+      Belief<Scalar, N>& belief, const Matrix<Scalar, O, O>& root,
+      const Matrix<Scalar, U, O>& slope, const Matrix<Scalar, M, O>& a,
+      const Matrix<Scalar, M, M>& noise, RobustCorrection<Scalar, M>& correction) {
+    Matrix<Scalar, M, M> s;
+    math::copy(noise, s);
+    if (!math::ldlt(s)) return Status::kNotPositiveDefinite;
+    math::copy(correction.S, s);
+    if (!math::ldlt(s)) return Status::kNotPositiveDefinite;
+    Vector<Scalar, M> residual;  // the innovation decorrelated
+    Scalar nis = Scalar(0);
+    for (int m = 0; m < M; ++m) {
+      residual(m) = math::minus_dot(correction.innovation(m), &s(m, 0), residual.data(), m);
+      nis = nis + residual(m) / s(m, m) * residual(m);
+    }
+    if (!math::is_finite(nis)) return Status::kOverflow;
+    correction.nis = nis;
+    if (correction.decision == Decision::kRejected) return Status::kOk;
     Matrix<Scalar, M, O> rows;
     Matrix<Scalar, M, M> e;
+    Correction<Scalar, M> weighted(Status::kOk);
+    weigh(a, noise, correction, rows, e, weighted.innovation);
+    innovation_covariance(rows, e, weighted.S);
+    Matrix<Scalar, O, O> moved;
+    math::copy(root, moved);
+    return correct_belief(belief, moved, slope, rows, e, weighted);
+  }
+
+  /// A, E and the innovation with the weights as they are.
+  template <int M, int O>
+  static void weigh(const Matrix<Scalar, M, O>& a, const Matrix<Scalar, M, M>& noise,
+                    const RobustCorrection<Scalar, M>& correction, Matrix<Scalar, M, O>& rows,
+                    Matrix<Scalar, M, M>& e, Vector<Scalar, M>& innovation) {
     math::copy(a, rows);
     math::copy(noise, e);
-    Vector<Scalar, M> innovation;
     for (int m = 0; m < M; ++m) {
       const Scalar weight = correction.weight(m);
       if (weight > Scalar(0)) {
@@ -108,42 +190,6 @@ struct RobustUpdate {
         innovation(m) = Scalar(0);
       }
     }
-    if (!math::ldlt(e)) return Status::kNotPositiveDefinite;
-    if (!potter(rows, e, innovation, posterior)) return Status::kOverflow;
-    if (correction.iterations == 0) correction.nis = posterior.nis;
-    return Status::kOk;
-  }
-
-  /// New weights from the residuals of the solution y, if they differ from the old ones. True if
-  /// they do.
-  template <int M, int O>
-  bool reweight(const Matrix<Scalar, M, O>& a, const Matrix<Scalar, M, M>& noise,
-                const Vector<Scalar, O>& y, RobustCorrection<Scalar, M>& correction) const {
-    using math::sqrt;
-    const bool post_fit = params.residual == Residual::kPostFit;
-    Vector<Scalar, M> weight;
-    bool changed = false;
-    for (int m = 0; m < M; ++m) {
-      Scalar residual = correction.innovation(m);
-      if (post_fit) residual = math::minus_dot(residual, &a(m, 0), y.data(), O);
-      const Scalar sigma = sqrt(post_fit ? noise(m, m) : correction.S(m, m));
-      correction.standardised(m) = residual / sigma;
-      weight(m) = kernel.weight(correction.standardised(m));
-      const Scalar change = weight(m) - correction.weight(m);
-      changed = changed || change > params.tolerance || -change > params.tolerance;
-    }
-    if (!changed) return false;
-    math::copy(weight, correction.weight);
-    bool all_full = true;
-    bool all_zero = true;
-    for (int m = 0; m < M; ++m) {
-      all_full = all_full && !(weight(m) < Scalar(1));
-      all_zero = all_zero && !(weight(m) > Scalar(0));
-    }
-    correction.decision = all_full   ? Decision::kAccepted
-                          : all_zero ? Decision::kRejected
-                                     : Decision::kDownweighted;
-    return true;
   }
 };
 

@@ -9,6 +9,7 @@
 
 #include <cstdint>
 
+#include "auvest/filters/late_updates.hpp"
 #include "auvest/math/basic.hpp"
 #include "auvest/math/random.hpp"
 #include "auvest/math/trigonometry.hpp"
@@ -18,17 +19,43 @@
 
 namespace auvest {
 
-/// Range errors: normal, and with a probability of another, larger size.
+/// Range errors: normal, with outliers among them or heavy tails.
 struct RangeNoise {
+  enum class Kind : std::uint8_t {
+    kContaminated,  ///< with a probability of another, larger size
+    kMultipath,     ///< the same, but an outlier is always too long, by |N(0, outlier_sigma)|
+    kStudent        ///< sigma times Student's t; no outliers of its own
+  };
+  Kind kind = Kind::kContaminated;
   double sigma_m = 1;
   double outlier_fraction = 0;
   double outlier_sigma_m = 10;
+  std::uint32_t degrees_of_freedom = 3;  ///< of Student's t
 
-  /// One uniform and one normal deviate, in this order.
+  /// One uniform and one normal deviate, in this order; then one more normal deviate for a
+  /// multipath outlier, or one for each of Student's degrees of freedom.
   double draw(math::Random& random) const {
     const bool outlier = random.uniform<double>() < outlier_fraction;
-    return (outlier ? outlier_sigma_m : sigma_m) * random.normal<double>();
+    const double deviate = random.normal<double>();
+    if (kind == Kind::kContaminated) return (outlier ? outlier_sigma_m : sigma_m) * deviate;
+    if (kind == Kind::kMultipath) {
+      const double late = outlier ? outlier_sigma_m * math::absolute(random.normal<double>()) : 0.0;
+      return sigma_m * deviate + late;
+    }
+    double chi_square = 0;
+    for (std::uint32_t k = 0; k < degrees_of_freedom; ++k) {
+      const double other = random.normal<double>();
+      chi_square += other * other;
+    }
+    return sigma_m * deviate / math::sqrt(chi_square / static_cast<double>(degrees_of_freedom));
   }
+};
+
+/// How a range reaches the slave, and what it makes of it.
+enum class RangeTiming : std::uint8_t {
+  kAtOnce,    ///< with the leader's position of now: not what an acoustic modem does
+  kOwnTime,   ///< with the leader's next message; taken at the time it was measured
+  kAsIfFresh  ///< the same, but paired with the position in the message and the state of now
 };
 
 /// The true motion of slave and leaders.
@@ -69,6 +96,11 @@ struct CooperativeScenario {
   std::uint32_t range_every = 5;     ///< steps between ranges; the leaders take turns
   double sigma_speed = 0.1;          ///< of the forward speed [m/s/sqrt(Hz)]
   double sigma_heading = 0.0174533;  ///< [rad/sqrt(Hz)]
+  RangeTiming timing = RangeTiming::kAtOnce;
+  double dropout = 0;             ///< probability that a message is lost, and with it its range
+  double late = 0;                ///< probability that a message arrives late
+  std::uint32_t late_steps = 10;  ///< by at most so many steps, 1..kMostLateSteps
+  static constexpr std::uint32_t kMostLateSteps = 20;
 };
 
 /// One step of the slave's instruments.
@@ -77,18 +109,42 @@ struct CooperativeStep {
   const CooperativeFleet& fleet;
   const Filter& filter;
   const Report* correction;  ///< of the range that was taken, or null
+  bool too_late;             ///< a range was older than the filter's memory
+};
+
+/// Events that the filter remembers: two cycles of messages and the longest delay.
+const int kCooperativeMemory = 64;
+
+/// A range on its way to the slave.
+struct RangeMessage {
+  bool pending = false;
+  int leader = 0;
+  std::uint32_t arrives = 0;   ///< step at which the slave has it
+  std::uint32_t measured = 0;  ///< step of the exchange
+  double range = 0;
+  double there[2] = {0, 0};  ///< the leader then [m]
 };
 
 /// Runs `steps` steps of dead reckoning with the ranges among them, and hands every step to
 /// `sink(step)`. `sensor` brings the noise the filter is told; its leader is set here. Stops at the
-/// first status that is not kOk and returns it.
+/// first status that is not kOk and returns it; a range that is too old is no such failure.
+///
+/// A leader's message carries its position now and the range of its previous exchange: a range is
+/// complete one cycle of its leader after it was measured.
 template <class Filter, class Sink>
 inline Status cooperate(Filter& filter,
                         LeaderRange<typename Filter::Scalar, Filter::kStates> sensor,
                         CooperativeScenario scenario, math::Random& random, std::uint32_t steps,
                         Sink&& sink) {
   using Scalar = typename Filter::Scalar;
+  using Sensor = LeaderRange<Scalar, Filter::kStates>;
+  using Late = LateUpdates<Filter, Sensor, kCooperativeMemory>;
+  using Report = typename Late::Report;
   CooperativeFleet& fleet = scenario.fleet;
+  const std::uint32_t cycle = 2 * scenario.range_every;
+  const int kMessages = 8;
+  RangeMessage messages[kMessages];
+  Late late(filter);
   for (std::uint32_t k = 1; k <= steps; ++k) {
     double speed_error = 0;
     double heading_error = 0;
@@ -100,27 +156,53 @@ inline Status cooperate(Filter& filter,
     input(2) =
         static_cast<Scalar>(fleet.heading() + per_sample * scenario.sigma_heading * heading_error);
     fleet.advance(scenario.dt_s);
-    const Status status = filter.predict(static_cast<Scalar>(scenario.dt_s), input);
+    const Status status = late.predict(static_cast<Scalar>(scenario.dt_s), input);
     if (status != Status::kOk) return status;
-    using Report = decltype(filter.update(Vector<Scalar, 1>(), sensor));
-    if (k % scenario.range_every != 0) {
-      sink(CooperativeStep<Filter, Report>{fleet, filter, nullptr});
-      continue;
+
+    if (k % scenario.range_every == 0) {
+      RangeMessage message;
+      message.leader = static_cast<int>(k / scenario.range_every % 2);
+      message.measured = k;
+      fleet.leader(message.leader, message.there);
+      const double dx = fleet.position[0] - message.there[0];
+      const double dy = fleet.position[1] - message.there[1];
+      message.range = math::sqrt(dx * dx + dy * dy) + scenario.noise.draw(random);
+      message.arrives = scenario.timing == RangeTiming::kAtOnce ? k : k + cycle;
+      message.pending = !(scenario.dropout > 0 && random.uniform<double>() < scenario.dropout);
+      if (scenario.late > 0 && random.uniform<double>() < scenario.late) {
+        message.arrives +=
+            1 + static_cast<std::uint32_t>(random.uniform<double>() * scenario.late_steps);
+      }
+      for (RangeMessage& slot : messages) {
+        if (slot.pending) continue;
+        slot = message;
+        break;
+      }
     }
 
-    const int which = static_cast<int>(k / scenario.range_every % 2);
-    double there[2];
-    fleet.leader(which, there);
-    const double dx = fleet.position[0] - there[0];
-    const double dy = fleet.position[1] - there[1];
-    const double range = math::sqrt(dx * dx + dy * dy) + scenario.noise.draw(random);
-    sensor.params.leader_x_m = static_cast<Scalar>(there[0]);
-    sensor.params.leader_y_m = static_cast<Scalar>(there[1]);
-    Vector<Scalar, 1> z;
-    z(0) = static_cast<Scalar>(range);
-    const Report correction = filter.update(z, sensor);
-    if (correction.status != Status::kOk) return correction.status;
-    sink(CooperativeStep<Filter, Report>{fleet, filter, &correction});
+    Report correction(Status::kOk);
+    bool taken = false;
+    bool too_late = false;
+    for (RangeMessage& message : messages) {
+      if (!message.pending || message.arrives != k) continue;
+      message.pending = false;
+      Scalar age = static_cast<Scalar>((k - message.measured) * scenario.dt_s);
+      if (scenario.timing == RangeTiming::kAsIfFresh) {
+        age = Scalar(0);
+        fleet.leader(message.leader, message.there);
+      }
+      sensor.params.leader_x_m = static_cast<Scalar>(message.there[0]);
+      sensor.params.leader_y_m = static_cast<Scalar>(message.there[1]);
+      Vector<Scalar, 1> z;
+      z(0) = static_cast<Scalar>(message.range);
+      correction = late.update(z, sensor, age);
+      too_late = too_late || correction.status == Status::kTimeBackwards;
+      if (correction.status == Status::kTimeBackwards) continue;
+      if (correction.status != Status::kOk) return correction.status;
+      taken = true;
+    }
+    filter = late.filter();
+    sink(CooperativeStep<Filter, Report>{fleet, filter, taken ? &correction : nullptr, too_late});
   }
   return Status::kOk;
 }

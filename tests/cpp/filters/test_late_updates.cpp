@@ -1,0 +1,123 @@
+// Late measurements end in the bits of the filter that had them in time; the memory is bounded.
+#include <doctest/doctest.h>
+
+#include <limits>
+
+#include "auvest/auvest.hpp"
+
+namespace {
+
+using auvest::Matrix;
+using auvest::Status;
+using auvest::Vector;
+using Process = auvest::SpeedHeading<float>;
+using Range = auvest::LeaderRange<float, 2>;
+using Filter = auvest::RobustEkf<Process>;
+using Input = Vector<float, 3>;
+using Z = Vector<float, 1>;
+template <int Capacity>
+using Late = auvest::LateUpdates<Filter, Range, Capacity>;
+
+Filter slave() {
+  Filter filter{auvest::Ekf<Process>(Process())};
+  REQUIRE(filter.reset(Vector<float, 2>(0, 0), 4 * Matrix<float, 2, 2>::Identity()) == Status::kOk);
+  return filter;
+}
+
+Range leader(int k) {
+  Range::Params p;
+  p.leader_x_m = k % 2 == 0 ? 300.0f : -150.0f;
+  p.leader_y_m = k % 2 == 0 ? 20.0f : 260.0f;
+  return Range(p);
+}
+
+Input motion(int k) { return Input(1.5f, 0.1f, 0.01f * float(k)); }
+
+Z range(int k) { return Z(250.0f + 10.0f * float(k % 7) + (k % 11 == 0 ? 60.0f : 0.0f)); }
+
+bool same(const Filter& a, const Filter& b) {
+  return a.x() == b.x() && a.P() == b.P() && a.rule().recovery.count == b.rule().recovery.count &&
+         a.rule().recovery.variance == b.rule().recovery.variance;
+}
+
+/// Of a filter that had every range in time: measured after step k, k = 4, 9, 14, ...
+Filter in_time(int steps, int without_after) {
+  Filter filter = slave();
+  for (int k = 0; k < steps; ++k) {
+    REQUIRE(filter.predict(1, motion(k)) == Status::kOk);
+    if (k % 5 == 4 && k <= without_after) {
+      REQUIRE(filter.update(range(k), leader(k)).status == Status::kOk);
+    }
+  }
+  return filter;
+}
+
+TEST_CASE("late updates: ten steps late, the bits are those of the filter that had them in time") {
+  Late<20> late(slave());
+  for (int k = 0; k < 200; ++k) {
+    REQUIRE(late.predict(1, motion(k)) == Status::kOk);
+    if (k % 5 == 4 && k >= 10) {
+      const int measured = k - 10;
+      const auto report = late.update(range(measured), leader(measured), 10);
+      REQUIRE(report.status == Status::kOk);
+    }
+    CHECK(same(late.filter(), in_time(k + 1, k % 5 == 4 ? k - 10 : k - k % 5 - 11)));
+  }
+}
+
+TEST_CASE("late updates: in any order, and the report is that of its own time") {
+  Filter plain = slave();
+  Late<64> late(slave());
+  auvest::RobustCorrection<float, 1> wanted(Status::kOk);
+  for (int k = 0; k < 12; ++k) {
+    REQUIRE(plain.predict(1, motion(k)) == Status::kOk);
+    REQUIRE(late.predict(1, motion(k)) == Status::kOk);
+    if (k == 3) wanted = plain.update(range(3), leader(3));
+    if (k == 7) REQUIRE(plain.update(range(7), leader(7)).status == Status::kOk);
+  }
+  REQUIRE(late.update(range(7), leader(7), 4).status == Status::kOk);
+  const auto found = late.update(range(3), leader(3), 8);
+  CHECK(found.innovation == wanted.innovation);
+  CHECK(found.S == wanted.S);
+  CHECK(found.nis == wanted.nis);
+  CHECK(same(late.filter(), plain));
+}
+
+TEST_CASE("late updates: a time between two steps is that of the nearer") {
+  for (const float age : {1.6f, 2.0f, 2.4f}) {
+    Late<16> a(slave()), b(slave());
+    for (int k = 0; k < 6; ++k) {
+      REQUIRE(a.predict(1, motion(k)) == Status::kOk);
+      REQUIRE(b.predict(1, motion(k)) == Status::kOk);
+      if (k == 3) REQUIRE(b.update(range(3), leader(3)).status == Status::kOk);
+    }
+    REQUIRE(a.update(range(3), leader(3), age).status == Status::kOk);
+    CHECK(same(a.filter(), b.filter()));
+  }
+}
+
+TEST_CASE("late updates: what is refused changes nothing, then or later") {
+  Late<8> late(slave()), other(slave());
+  const auto check_refused = [&](const Z& z, float age, Status wanted) {
+    CHECK(late.update(z, leader(0), age).status == wanted);
+    CHECK(same(late.filter(), other.filter()));
+  };
+  check_refused(Z(250), 1, Status::kTimeBackwards);  // nothing is known of then
+  for (int k = 0; k < 30; ++k) {
+    REQUIRE(late.predict(1, motion(k)) == Status::kOk);
+    REQUIRE(other.predict(1, motion(k)) == Status::kOk);
+    if (k < 10) continue;
+    check_refused(Z(250), 9, Status::kTimeBackwards);  // 8 events
+    check_refused(Z(250), -1, Status::kTimeBackwards);
+    check_refused(Z(250), std::numeric_limits<float>::infinity(), Status::kNotFinite);
+    check_refused(Z(std::numeric_limits<float>::quiet_NaN()), 3, Status::kNotFinite);
+    check_refused(Z(std::numeric_limits<float>::infinity()), 0, Status::kNotFinite);
+    CHECK(late.predict(-1, motion(k)) == Status::kTimeBackwards);
+    CHECK(same(late.filter(), other.filter()));
+  }
+  REQUIRE(late.update(range(1), leader(1), 8).status == Status::kOk);
+  REQUIRE(other.update(range(1), leader(1), 8).status == Status::kOk);
+  CHECK(same(late.filter(), other.filter()));
+}
+
+}  // namespace
