@@ -1,7 +1,8 @@
-// The RMSE of dead reckoning, SLATF 1.0 and 2.0 and EKF-SLAT over the noise levels of the SLATF
-// paper, in configuration R1 (docs/algorithms/slatf.md).
+// The RMSE of dead reckoning, SLATF 1.0 and 2.0, SlatfJoint and EKF-SLAT over the noise levels of
+// the SLATF paper, in configuration R1 (docs/algorithms/slatf.md), and whether they know how far
+// off they are: the NEES of the slave's position, 2 on average for a consistent filter.
 //
-//     slat_table [runs] [particles]     prints means and standard errors in metres
+//     slat_table [runs] [particles] [kept]     prints means and standard errors in metres
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -17,48 +18,62 @@ using Motion = auvest::CompassMotion<Scalar>;
 using Master = auvest::PiecewiseAcceleration<Scalar>;
 using Slatf1 = auvest::Slatf1<Motion, Master, 1>;
 using Slatf2 = auvest::Slatf2<Motion, Master, 1>;
+using SlatfJoint = auvest::SlatfJoint<Motion, Master, 1>;
 
-struct Column {
-  const char* name;
+constexpr double kBound95 = 5.991;  // chi-square, 2 degrees of freedom
+
+struct Mean {
   double sum = 0;
   double squares = 0;
   int runs = 0;
 
-  explicit Column(const char* title) : name(title) {}
   void add(double value) {
     sum += value;
     squares += value * value;
     ++runs;
   }
-  double mean() const { return sum / runs; }
-  double error() const { return std::sqrt((squares / runs - mean() * mean()) / runs); }
+  double value() const { return sum / runs; }
+  double error() const { return std::sqrt((squares / runs - value() * value()) / runs); }
 };
 
-/// Root mean square of the slave's position error over the pings of one run.
+struct Column {
+  const char* name;
+  Mean rmse;    ///< of the slave's position over the pings of a run
+  Mean inside;  ///< share of a run's pings with the slave's NEES inside its 95 % bound
+
+  explicit Column(const char* title) : name(title) {}
+};
+
 template <class Filter>
-double rmse(Filter& filter, const auvest::SlatScenario& scenario, int run) {
+void run(Filter& filter, const auvest::SlatScenario& scenario, int number, Column& column) {
   auvest::Sonar<Scalar>::Params sonar;
   sonar.sigma_range_m = scenario.sigma_range_m;
   sonar.sigma_bearing_rad = scenario.sigma_bearing_rad;
-  auvest::math::Random world(1, 2 * static_cast<std::uint64_t>(run));
-  auvest::math::Random random(1, 2 * static_cast<std::uint64_t>(run) + 1);
+  auvest::math::Random world(1, 2 * static_cast<std::uint64_t>(number));
+  auvest::math::Random random(1, 2 * static_cast<std::uint64_t>(number) + 1);
   double square = 0;
+  int inside = 0;
   int pings = 0;
-  const auvest::Status status =
-      auvest::run_slat(filter, auvest::Sonar<Scalar>(sonar), scenario, world, random,
-                       [&](const auvest::SlatStep<Filter>& step) {
-                         const auto x = filter.slave().x;
-                         for (int i = 0; i < 2; ++i) {
-                           const double e = x(i) - step.slave.position[i];
-                           square += e * e;
-                         }
-                         ++pings;
-                       });
+  const auvest::Status status = auvest::run_slat(
+      filter, auvest::Sonar<Scalar>(sonar), scenario, world, random,
+      [&](const auvest::SlatStep<Filter>& step) {
+        const auto slave = filter.slave();
+        const double x = slave.x(0) - step.slave.position[0];
+        const double y = slave.x(1) - step.slave.position[1];
+        const auto& P = slave.P;
+        const double determinant = P(0, 0) * P(1, 1) - P(1, 0) * P(1, 0);
+        square += x * x + y * y;
+        inside += P(1, 1) * x * x - 2 * P(1, 0) * x * y + P(0, 0) * y * y < kBound95 * determinant
+                      ? 1
+                      : 0;
+        ++pings;
+      });
   if (status != auvest::Status::kOk) {
     std::fprintf(stderr, "slat_table: %s\n", auvest::describe(status));
     std::exit(1);
   }
-  return std::sqrt(square / pings);
+  column.rmse.add(std::sqrt(square / pings));
+  column.inside.add(static_cast<double>(inside) / pings);
 }
 
 }  // namespace
@@ -66,8 +81,11 @@ double rmse(Filter& filter, const auvest::SlatScenario& scenario, int run) {
 int main(int argc, char** argv) {
   const int runs = argc > 1 ? std::atoi(argv[1]) : 50;
   const int particles = argc > 2 ? std::atoi(argv[2]) : 100;
-  if (argc > 3 || runs < 1 || particles < 1) {
-    std::fputs("usage: slat_table [runs >= 1] [particles >= 1]\n", stderr);
+  SlatfJoint::Params joint_params;
+  if (argc > 3) joint_params.kept = std::atof(argv[3]);
+  if (argc > 4 || runs < 1 || particles < 1 ||
+      !(joint_params.kept >= 0 && joint_params.kept <= 1)) {
+    std::fputs("usage: slat_table [runs >= 1] [particles >= 1] [kept, 0 to 1]\n", stderr);
     return 2;
   }
   // Section 7: standard deviations of range [m] and bearing [rad] of levels 1 to 7.
@@ -75,34 +93,39 @@ int main(int argc, char** argv) {
                                {1.5, 0.09}, {0.8, 0.05}, {0.3, 0.015}};
   std::vector<Scalar> storage1(Slatf1::Set::storage_size(particles));
   std::vector<Scalar> storage2(Slatf2::Set::storage_size(particles));
+  std::vector<Scalar> storage_joint(SlatfJoint::Set::storage_size(particles));
   Motion::Params plain;
   plain.compensate_bias = false;
-  std::printf("%d runs, N = %d, RMSE in m\nlevel", runs, particles);
+  std::printf("%d runs, N = %d, kept = %g: RMSE in m (NEES inside its 95 %% bound)\nlevel", runs,
+              particles, joint_params.kept);
   for (int level = 0; level < 7; ++level) {
     auvest::SlatScenario scenario;
     scenario.sigma_range_m = levels[level][0];
     scenario.sigma_bearing_rad = levels[level][1];
-    Column columns[5] = {Column("dead reckoning"), Column("compensated"), Column("SLATF 1.0"),
-                         Column("SLATF 2.0"), Column("EKF-SLAT")};
-    for (int run = 0; run < runs; ++run) {
+    Column columns[6] = {Column("dead reckoning"), Column("compensated"), Column("SLATF 1.0"),
+                         Column("SLATF 2.0"),      Column("SlatfJoint"),  Column("EKF-SLAT")};
+    for (int k = 0; k < runs; ++k) {
       auvest::DeadReckoning<Motion> reckoning((Motion(plain)));
       auvest::DeadReckoning<Motion> compensated((Motion()));
       Slatf1 slatf1(Motion(), Master(), Slatf1::Params(), storage1.data(), particles);
       Slatf2 slatf2(Motion(), Master(), Slatf2::Params(), storage2.data(), particles);
+      SlatfJoint joint(Motion(), Master(), joint_params, storage_joint.data(), particles);
       auvest::EkfSlat<Motion, Master, 1> ekf((Motion()), Master());
-      columns[0].add(rmse(reckoning, scenario, run));
-      columns[1].add(rmse(compensated, scenario, run));
-      columns[2].add(rmse(slatf1, scenario, run));
-      columns[3].add(rmse(slatf2, scenario, run));
-      columns[4].add(rmse(ekf, scenario, run));
+      run(reckoning, scenario, k, columns[0]);
+      run(compensated, scenario, k, columns[1]);
+      run(slatf1, scenario, k, columns[2]);
+      run(slatf2, scenario, k, columns[3]);
+      run(joint, scenario, k, columns[4]);
+      run(ekf, scenario, k, columns[5]);
     }
     if (level == 0) {
-      for (const Column& column : columns) std::printf("  %16s", column.name);
+      for (const Column& column : columns) std::printf("  %20s", column.name);
       std::printf("\n");
     }
     std::printf("%5d", level + 1);
     for (const Column& column : columns) {
-      std::printf("    %6.1f +- %4.1f", column.mean(), column.error());
+      std::printf("  %7.1f +- %3.1f (%2.0f %%)", column.rmse.value(), column.rmse.error(),
+                  100 * column.inside.value());
     }
     std::printf("\n");
   }

@@ -171,7 +171,8 @@ TEST_CASE("explicit scalar: same bits as double") {
   }
 }
 
-/// SLATF, EKF-SLAT and dead reckoning over a few steps; the slave's estimates one after the other.
+/// SLATF, SlatfJoint, EKF-SLAT and dead reckoning over a few steps; the slave's estimates one after
+/// the other.
 template <class Scalar>
 struct Slat {
   template <class Filter>
@@ -209,11 +210,10 @@ struct Slat {
     }
   }
 
-  template <class Proposal, class Motion>
+  template <class Filter>
   static void particles(std::vector<double>& numbers) {
-    using Filter = auvest::Slatf<Motion, auvest::PiecewiseAcceleration<Scalar>, Proposal, 1>;
     typename Filter::template Storage<20> storage;
-    Filter filter(Motion(), auvest::PiecewiseAcceleration<Scalar>(), typename Filter::Params(),
+    Filter filter(typename Filter::Motion(), typename Filter::Master(), typename Filter::Params(),
                   storage);
     run(filter, numbers);
     numbers.push_back(double(filter.master(0).P(5, 5)));
@@ -224,12 +224,14 @@ struct Slat {
     using Compass = auvest::CompassMotion<Scalar>;
     using Unicycle = auvest::UnicycleMotion<Scalar>;
     std::vector<double> numbers;
-    particles<auvest::MotionProposal, Compass>(numbers);
-    particles<auvest::MeasurementProposal, Compass>(numbers);
-    particles<auvest::MotionProposal, Unicycle>(numbers);
-    particles<auvest::MeasurementProposal, Unicycle>(numbers);
-    auvest::EkfSlat<Unicycle, auvest::PiecewiseAcceleration<Scalar>, 1> ekf(
-        (Unicycle()), auvest::PiecewiseAcceleration<Scalar>());
+    using Master = auvest::PiecewiseAcceleration<Scalar>;
+    particles<auvest::Slatf1<Compass, Master, 1>>(numbers);
+    particles<auvest::Slatf2<Compass, Master, 1>>(numbers);
+    particles<auvest::SlatfJoint<Compass, Master, 1>>(numbers);
+    particles<auvest::Slatf1<Unicycle, Master, 1>>(numbers);
+    particles<auvest::Slatf2<Unicycle, Master, 1>>(numbers);
+    particles<auvest::SlatfJoint<Unicycle, Master, 1>>(numbers);
+    auvest::EkfSlat<Unicycle, Master, 1> ekf((Unicycle()), Master());
     run(ekf, numbers);
     auvest::DeadReckoning<Compass> reckoning((Compass()));
     run(reckoning, numbers);

@@ -10,6 +10,8 @@
 #include "auvest/filters/ukf.hpp"
 #include "auvest/math/random.hpp"
 #include "auvest/models/constant_acceleration.hpp"
+#include "auvest/models/constant_velocity.hpp"
+#include "auvest/models/coordinated_turn.hpp"
 #include "auvest/models/leader_range.hpp"
 #include "auvest/models/linear.hpp"
 #include "auvest/models/odometry.hpp"
@@ -57,9 +59,10 @@ void check_process(const Model& model, double dt) {
     belief.x = x;
     belief.P = a * a.transpose();
     const Matrix<double, n, n> expected = phi * belief.P * phi.transpose() + model.Q(dt);
+    const auto next = model.f(x, dt);
     model.propagate(belief, dt);
     for (int i = 0; i < n; ++i) {
-      CHECK(belief.x(i) == close_to(model.f(x, dt)(i), 1e-12));
+      CHECK(std::fabs(belief.x(i) - next(i)) <= 1e-12 * std::fabs(next(i)));
       for (int j = 0; j <= i; ++j) {
         CHECK(std::fabs(belief.P(i, j) - expected(i, j)) < 1e-13 * expected.trace());
       }
@@ -172,6 +175,11 @@ TEST_CASE("process models") {
   check_process(auvest::PiecewiseAcceleration<double>(), 0.7);
   check_process(auvest::ExactAcceleration<double>(), 0.5);
   check_process(auvest::ExactAcceleration<double>(), 30);
+  check_process(auvest::ConstantVelocity<double>(), 0.7);
+  auvest::CoordinatedTurn<double>::Params turn;
+  turn.slow_mps = 5;  // the random states turn by up to 2 rad/s
+  check_process(auvest::CoordinatedTurn<double>(turn), 0.5);
+  check_process(auvest::CoordinatedTurn<double>(turn), 0.01);  // its series
   check_process(driven(auvest::SpeedHeading<double>()), 0.5);
   check_process(driven(auvest::SpeedHeading<double, true>()), 0.5);
   check_process(driven(auvest::SpeedHeading<double, false, true>()), 0.5);
@@ -245,6 +253,62 @@ TEST_CASE("constant acceleration: position_variance is the trace that propagate 
   belief.P = a * a.transpose();
   check_position_variance(auvest::EulerAcceleration<double>(), belief);
   check_position_variance(auvest::ExactAcceleration<double>(), belief);
+}
+
+TEST_CASE("constant velocity: an acceleration has no memory, but where no time passes") {
+  const auvest::ConstantVelocity<double> model;
+  Belief<double, 6> belief;
+  belief.x << 1, 2, 3, 4, 5, 6;
+  belief.P = Matrix<double, 6, 6>::Identity();
+  belief.P(4, 0) = 0.5;
+  const Belief<double, 6> before = belief;
+  model.propagate(belief, 0);
+  CHECK(belief.x == before.x);
+  CHECK(belief.P == before.P);
+  model.propagate(belief, 2);
+  CHECK(belief.x == (Vector<double, 6>() << 7, 10, 3, 4, 0, 0).finished());
+  CHECK(belief.P(4, 0) == 0);
+  CHECK(belief.P(4, 4) ==
+        model.params.sigma_acceleration_mps2 * model.params.sigma_acceleration_mps2);
+  // White noise of density q over dt: q dt^3/3, q dt^2/2, q dt (and the motion of P itself).
+  CHECK(belief.P(0, 0) == close_to(1 + 4 + 1e-4 * 8 / 3, 1e-14));
+  CHECK(belief.P(2, 0) == close_to(2 + 1e-4 * 4 / 2, 1e-14));
+  CHECK(belief.P(2, 2) == close_to(1 + 1e-4 * 2, 1e-14));
+}
+
+template <class Scalar>
+void check_circle(double tolerance) {
+  // 5 m/s on a circle of 20 m about (0, 0), counter-clockwise and clockwise.
+  typename auvest::CoordinatedTurn<Scalar>::Params params;
+  params.slow_mps = Scalar(1e-4);
+  const auvest::CoordinatedTurn<Scalar> model(params);
+  for (const double omega : {0.25, -0.25}) {
+    const auto on_circle = [omega](double angle) {
+      const double c = 20 * std::cos(angle), s = 20 * std::sin(angle), square = omega * omega;
+      return (Vector<Scalar, 6>() << Scalar(c), Scalar(s), Scalar(-omega * s), Scalar(omega * c),
+              Scalar(-square * c), Scalar(-square * s))
+          .finished();
+    };
+    for (const double dt : {1e-3, 0.1, 1.0, 7.0, 30.0}) {  // up to 7.5 rad
+      const auto found = model.f(on_circle(1), Scalar(dt));
+      const auto expected = on_circle(1 + omega * dt);
+      for (int i = 0; i < 6; ++i) {
+        CHECK(std::fabs(static_cast<double>(found(i) - expected(i))) < tolerance);
+      }
+    }
+  }
+}
+
+TEST_CASE("coordinated turn: exact on a circle; straight on it is constant acceleration") {
+  check_circle<double>(1e-7);  // the share of v_0: (1e-4 / 5)^2 of the angle
+  check_circle<float>(3e-5);
+  Vector<double, 6> x;
+  x << 1, 2, 3, 4, 0.6, 0.8;  // acceleration along the velocity
+  const auto straight = auvest::ExactAcceleration<double>().f(x, 0.7);
+  CHECK((auvest::CoordinatedTurn<double>().f(x, 0.7) - straight).norm() < 1e-14);
+  x << 1, 2, 0, 0, 0.6, 0.8;  // standing
+  const auto start = auvest::ExactAcceleration<double>().f(x, 0.7);
+  CHECK((auvest::CoordinatedTurn<double>().f(x, 0.7) - start).norm() < 1e-14);
 }
 
 TEST_CASE("range and bearing: closed second differences against their Taylor series") {
@@ -536,6 +600,16 @@ TEST_CASE("models refuse bad parameters") {
   CHECK(auvest::ExactAcceleration<double>(noise).check() == auvest::Status::kBadParameter);
   noise.velocity = nan;
   CHECK(auvest::EulerAcceleration<double>(noise).check() == auvest::Status::kBadParameter);
+  auvest::CoordinatedTurn<double>::Params turn;
+  turn.noise = noise;
+  CHECK(auvest::CoordinatedTurn<double>(turn).check() == auvest::Status::kBadParameter);
+  turn.noise = auvest::AccelerationNoise<double>();
+  CHECK(auvest::CoordinatedTurn<double>(turn).check() == auvest::Status::kOk);
+  turn.slow_mps = 0;
+  CHECK(auvest::CoordinatedTurn<double>(turn).check() == auvest::Status::kBadParameter);
+  auvest::ConstantVelocity<double>::Params straight;
+  straight.sigma_acceleration_mps2 = -1;
+  CHECK(auvest::ConstantVelocity<double>(straight).check() == auvest::Status::kBadParameter);
 }
 
 }  // namespace

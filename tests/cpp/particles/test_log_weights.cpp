@@ -14,7 +14,7 @@ namespace {
 
 template <class Scalar>
 struct Weights {
-  using Set = auvest::ParticleSet<Scalar, 1>;
+  using Set = auvest::ParticleSet<Scalar, 0>;
   std::vector<Scalar> storage;
   Set set;
   auvest::WeightSummary<Scalar> summary;
@@ -25,11 +25,11 @@ struct Weights {
     set.resize(static_cast<int>(logs.size()));
     auvest::equal_weights(set);
     for (int i = 0; i < set.size(); ++i) {
-      set.log_weight(i) = static_cast<Scalar>(logs[static_cast<std::size_t>(i)]);
+      set.log_weights()[i] = static_cast<Scalar>(logs[static_cast<std::size_t>(i)]);
     }
     summary = auvest::normalise<auvest::OneLane<Scalar>>(set);
   }
-  double weight(int i) const { return double(auvest::weight_of(set.log_weight(i))); }
+  double weight(int i) const { return double(auvest::weight_of(set.log_weights()[i])); }
 };
 
 TEST_CASE("normalise: known weights, their sum and N_eff") {

@@ -55,6 +55,16 @@ void check_function(const std::vector<float>& x, Scalar scalar, Batch batch) {
 TEST_CASE("elementary functions: the scalar bits in every lane") {
   const std::vector<float> x = arguments();
   check_function(
+      x, [](float a) { return -a; }, [](Value a) { return -a; });
+  for (const float other : {0.0f, -0.0f, 1.0f, NAN}) {
+    check_function(
+        x, [other](float a) { return math::larger(a, other); },
+        [other](Value a) { return math::larger(a, Value(other)); });
+    check_function(
+        x, [other](float a) { return math::larger(other, a); },
+        [other](Value a) { return math::larger(Value(other), a); });
+  }
+  check_function(
       x, [](float a) { return math::exp(a); }, [](Value a) { return math::exp(a); });
   check_function(
       x, [](float a) { return math::log(a); }, [](Value a) { return math::log(a); });
@@ -244,6 +254,11 @@ struct Run {
       }
       REQUIRE(filter.update(seen, k % 3, auvest::Sonar<float>(sonar), random) ==
               auvest::Status::kOk);
+      const auto positions = filter.positions();
+      for (int d = 0; d < 2; ++d) {
+        numbers.push_back(positions.slave(d));
+        for (const auto& master : positions.masters) numbers.push_back(master(d));
+      }
       note(filter.slave());
       note(filter.master(0));
       numbers.push_back(filter.effective_size());
@@ -251,6 +266,7 @@ struct Run {
       numbers.push_back(static_cast<float>(filter.resamplings()));
     }
     for (int i = 0; i < particles; ++i) {
+      numbers.push_back(filter.set().log_weights()[i]);
       for (int f = 0; f < Filter::Set::kFields; ++f) numbers.push_back(*filter.set().at(i, f));
     }
     if (particles > 1) CHECK(filter.resamplings() > 2);

@@ -74,7 +74,8 @@ struct FloatBatch {
   friend AUVEST_INLINE FloatBatch operator/(const FloatBatch& a, const FloatBatch& b) {
     return FloatBatch(Batch(a.v / b.v));
   }
-  AUVEST_INLINE FloatBatch operator-() const { return FloatBatch(Batch(-v)); }
+  /// With the sign of zero, as a number's. (xsimd's, for AVX-512, is 0 - v.)
+  AUVEST_INLINE FloatBatch operator-() const { return FloatBatch(Batch(v ^ Batch(-0.0f))); }
   friend AUVEST_INLINE Mask operator<(const FloatBatch& a, const FloatBatch& b) {
     return a.v < b.v;
   }
@@ -98,6 +99,12 @@ template <class Arch>
 AUVEST_INLINE FloatBatch<Arch> select(const xsimd::batch_bool<float, Arch>& condition,
                                       const FloatBatch<Arch>& yes, const FloatBatch<Arch>& no) {
   return FloatBatch<Arch>(xsimd::select(condition, yes.v, no.v));
+}
+
+/// One instruction; a NaN gives what the general larger() gives.
+template <class Arch>
+AUVEST_INLINE FloatBatch<Arch> larger(const FloatBatch<Arch>& a, const FloatBatch<Arch>& b) {
+  return FloatBatch<Arch>(xsimd::max(b.v, a.v));
 }
 
 template <class Arch>
@@ -237,6 +244,8 @@ AUVEST_INLINE FloatBatch<Arch> atan2(const FloatBatch<Arch>& y, const FloatBatch
 template <class Arch>
 AUVEST_INLINE FloatBatch<Arch> wrap(const FloatBatch<Arch>& a) {
   using Value = FloatBatch<Arch>;
+  const Mask<Value> inside = a > Value(-pi<float>()) && a <= Value(pi<float>());
+  if (xsimd::all(inside)) return a;
   const Value size = absolute(a);
   if (!xsimd::all(size <= Value(9.424777f))) {
     return detail::lane_by_lane(a, [](float lane) { return math::wrap(lane); });
@@ -244,7 +253,7 @@ AUVEST_INLINE FloatBatch<Arch> wrap(const FloatBatch<Arch>& a) {
   const Value turned = (size - Value(6.28318548f)) + Value(1.74845553e-07f);
   const Value signed_turn = select(a < Value(0.0f), -turned, turned);
   const Value outside = select(size > Value(pi<float>()), signed_turn, size);  // -pi: +pi
-  return select(a > Value(-pi<float>()) && a <= Value(pi<float>()), a, outside);
+  return select(inside, a, outside);
 }
 
 }  // namespace math

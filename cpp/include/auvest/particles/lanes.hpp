@@ -8,6 +8,10 @@
 //     Word             the same of 32-bit unsigned integers
 //     kWidth           divides kBlock
 //     load(p), store(p, value), index(first)
+//     prefetch(p)      asks for the cache line of p, if there is a cache
+//     kPairs, Pair<S>  whether two groups may go through a kernel side by side (math/twin.hpp), and
+//                      the lanes policy of such a pair, whose second group lies S numbers further
+//                      on
 #pragma once
 
 #include <cstdint>
@@ -31,10 +35,14 @@ struct OneLane {
   using Value = Scalar_;
   using Word = uint32_t;
   static constexpr int kWidth = 1;
+  static constexpr bool kPairs = false;
+  template <int Stride>
+  using Pair = OneLane;
 
   static AUVEST_INLINE Value load(const Scalar* from) { return *from; }
   static AUVEST_INLINE void store(Scalar* to, const Value& value) { *to = value; }
   static AUVEST_INLINE Word index(int first) { return static_cast<uint32_t>(first); }
+  static AUVEST_INLINE void prefetch(const Scalar*) {}
 };
 
 }  // namespace auvest

@@ -40,11 +40,12 @@ inline WeightSummary<typename Lanes::Scalar> normalise(const Set& set) {
   using Scalar = typename Lanes::Scalar;
   using Value = typename Lanes::Value;
   const int n = set.size();
+  Scalar* log_weights = set.log_weights();
   Scalar most[kBlock];
   for (int i = 0; i < kBlock; ++i) most[i] = no_log_weight<Scalar>();
   for (int i = 0; i < n; i += Lanes::kWidth) {
     Scalar* best = most + place_in_block(i);
-    Lanes::store(best, larger(Lanes::load(best), Lanes::load(&set.log_weight(i))));
+    Lanes::store(best, larger(Lanes::load(best), Lanes::load(log_weights + i)));
   }
   Scalar largest = most[0];
   for (int i = 1; i < kBlock; ++i) largest = larger(largest, most[i]);
@@ -52,15 +53,15 @@ inline WeightSummary<typename Lanes::Scalar> normalise(const Set& set) {
   OrderedSum<Lanes> sum;
   OrderedSum<Lanes> squares;
   for (int i = 0; i < n; i += Lanes::kWidth) {
-    const Value w = weight_of(Value(Lanes::load(&set.log_weight(i)) - Value(largest)));
+    const Value w = weight_of(Value(Lanes::load(log_weights + i) - Value(largest)));
     sum.add(i, w);
     squares.add(i, w * w);
   }
   const Scalar total = sum.total();
   const Scalar log_total = log(total);
   for (int i = 0; i < n; i += Lanes::kWidth) {
-    const Value relative = Lanes::load(&set.log_weight(i)) - Value(largest);
-    Lanes::store(&set.log_weight(i), relative - Value(log_total));
+    const Value relative = Lanes::load(log_weights + i) - Value(largest);
+    Lanes::store(log_weights + i, relative - Value(log_total));
   }
   WeightSummary<Scalar> summary;
   summary.log_sum = largest + log_total;
@@ -75,8 +76,8 @@ inline void equal_weights(const Set& set) {
   using Scalar = typename Set::Scalar;
   const Scalar log_weight = -log(Scalar(set.size()));
   int i = 0;
-  for (; i < set.size(); ++i) set.log_weight(i) = log_weight;
-  for (; place_in_block(i) != 0; ++i) set.log_weight(i) = no_log_weight<Scalar>();
+  for (; i < set.size(); ++i) set.log_weights()[i] = log_weight;
+  for (; place_in_block(i) != 0; ++i) set.log_weights()[i] = no_log_weight<Scalar>();
 }
 
 }  // namespace auvest

@@ -10,6 +10,15 @@
 
 namespace auvest {
 
+/// The sum of `count` partial sums, a power of two; they are overwritten.
+template <class Scalar>
+inline Scalar fold(Scalar* partial, int count) {
+  for (int half = count / 2; half > 0; half /= 2) {
+    for (int i = 0; i < half; ++i) partial[i] = partial[i] + partial[i + half];
+  }
+  return partial[0];
+}
+
 template <class Lanes>
 class OrderedSum {
  public:
@@ -17,26 +26,25 @@ class OrderedSum {
   using Value = typename Lanes::Value;
 
   OrderedSum() {
-    for (int i = 0; i < kBlock; ++i) partial_[i] = Scalar(0);
+    for (Value& partial : partial_) partial = Value(0);
   }
 
   /// Adds the values of the particles from `first` on.
   AUVEST_INLINE void add(int first, const Value& value) {
-    Scalar* partial = partial_ + place_in_block(first);
-    Lanes::store(partial, Lanes::load(partial) + value);
+    Value& partial = partial_[place_in_block(first) / Lanes::kWidth];
+    partial = partial + value;
   }
 
   Scalar total() const {
     Scalar folded[kBlock];
-    for (int i = 0; i < kBlock; ++i) folded[i] = partial_[i];
-    for (int half = kBlock / 2; half > 0; half /= 2) {
-      for (int i = 0; i < half; ++i) folded[i] = folded[i] + folded[i + half];
+    for (int i = 0; i < kBlock; i += Lanes::kWidth) {
+      Lanes::store(folded + i, partial_[i / Lanes::kWidth]);
     }
-    return folded[0];
+    return fold(folded, kBlock);
   }
 
  private:
-  Scalar partial_[kBlock];
+  Value partial_[kBlock / Lanes::kWidth];
 };
 
 }  // namespace auvest

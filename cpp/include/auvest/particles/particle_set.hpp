@@ -1,7 +1,9 @@
-// The particles: numbers in storage that the caller owns, in blocks of kBlock particles.
+// The particles: numbers in storage that the caller owns.
 //
-// Field 0 is the logarithm of the weight; what the others mean is the filter's business. The last
-// block is filled up with particles of weight zero, so that kernels may always take whole blocks.
+// First the logarithms of all weights, which much reads that needs nothing else of a particle. Then
+// the other fields, whose meaning is the filter's business, in blocks of kBlock particles in which
+// each field is an array. The last block is filled up with particles of weight zero, so that
+// kernels may always take whole blocks.
 #pragma once
 
 #include <cstddef>
@@ -15,45 +17,41 @@ template <class Scalar_, int Fields>
 class ParticleSet {
  public:
   using Scalar = Scalar_;
-  static constexpr int kFields = Fields;
-  static constexpr int kLogWeight = 0;
+  static constexpr int kFields = Fields;  ///< beside the weight
 
   /// Scalars of storage that `capacity` particles take.
   static constexpr std::size_t storage_size(int capacity) {
-    return static_cast<std::size_t>((capacity + kBlock - 1) / kBlock) *
-           static_cast<std::size_t>(kBlock * Fields);
+    return whole_blocks(capacity) * static_cast<std::size_t>(1 + Fields);
   }
 
-  ParticleSet(Scalar* storage, int capacity) : storage_(storage), capacity_(capacity), size_(0) {}
+  ParticleSet(Scalar* storage, int capacity)
+      : log_weights_(storage),
+        blocks_(storage + whole_blocks(capacity)),
+        capacity_(capacity),
+        size_(0) {}
+
+  /// As many particles as `other`, in a storage of the same capacity.
+  ParticleSet(Scalar* storage, const ParticleSet& other) : ParticleSet(storage, other.capacity_) {
+    size_ = other.size_;
+  }
 
   int capacity() const { return capacity_; }
   int size() const { return size_; }
   void resize(int size) { size_ = size; }
 
+  /// The logarithms of the weights, by the particles' numbers.
+  AUVEST_INLINE Scalar* log_weights() const { return log_weights_; }
+  AUVEST_INLINE Scalar& log_weight(int i) const { return log_weights_[i]; }
+
   /// Field `field` of particle i; those of the following particles of its block lie behind it.
   AUVEST_INLINE Scalar* at(int i, int field) const {
     const std::size_t block = static_cast<unsigned>(i) / static_cast<unsigned>(kBlock);
     const std::size_t row = block * static_cast<std::size_t>(Fields);
-    return storage_ + (row + static_cast<std::size_t>(field)) * static_cast<std::size_t>(kBlock) +
+    return blocks_ + (row + static_cast<std::size_t>(field)) * static_cast<std::size_t>(kBlock) +
            place_in_block(i);
   }
 
-  /// One field of all particles, by their numbers.
-  class Field {
-   public:
-    using value_type = Scalar;
-    Scalar& operator[](int i) const { return *set_.at(i, number_); }
-
-   private:
-    friend class ParticleSet;
-    Field(const ParticleSet& set, int number) : set_(set), number_(number) {}
-    const ParticleSet& set_;
-    int number_;
-  };
-  Field field(int number) const { return Field(*this, number); }
-  AUVEST_INLINE Scalar& log_weight(int i) const { return *at(i, kLogWeight); }
-
-  /// Overwrites particle `to` by particle `from`, its weight included.
+  /// Overwrites the fields of particle `to` by those of particle `from`; the weights stay.
   void copy(int from, int to) const {
     const Scalar* source = at(from, 0);
     Scalar* target = at(to, 0);
@@ -66,7 +64,13 @@ class ParticleSet {
   }
 
  private:
-  Scalar* storage_;
+  static constexpr std::size_t whole_blocks(int capacity) {
+    return static_cast<std::size_t>((capacity + kBlock - 1) / kBlock) *
+           static_cast<std::size_t>(kBlock);
+  }
+
+  Scalar* log_weights_;
+  Scalar* blocks_;
   int capacity_;
   int size_;
 };

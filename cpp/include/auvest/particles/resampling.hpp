@@ -2,12 +2,12 @@
 //
 // A policy turns normalised weights into numbers of offspring, in place:
 //
-//     template <class Weights> static void count(Weights& w, int n, math::Random& random)
+//     template <class Scalar> void count(Scalar* w, int n, math::Random& random) const
 //
-// (Weights: value_type and operator[].) In: w[i] >= 0, not all zero; out: w[i] = how often particle
-// i goes on, n in all, with expectation n w[i] / sum w. redistribute() then copies particles over
-// the dead ones. Neither needs a second particle set, nor an index array: the weights, which nobody
-// needs any more, hold the counts.
+// (The policies of this file have no state: theirs is static.)
+// In: w[i] >= 0, not all zero; out: w[i] = how often particle i goes on, n in all, with expectation
+// n w[i] / sum w. redistribute() then copies particles over the dead ones. Neither needs a second
+// particle set, nor an index array: the weights, which nobody needs any more, hold the counts.
 //
 // How the policies compare: Douc, Cappe and Moulines, "Comparison of resampling schemes for
 // particle filtering", ISPA 2005.
@@ -22,8 +22,8 @@ namespace detail {
 
 /// w[i] <- base(w[i]) + the number of ascending positions, `draws` in [0, 1), that fall on particle
 /// i's share of the line share(w[0]), share(w[1]), ...
-template <class Weights, class Scalar, class Split, class Positions>
-inline void count_positions(Weights& w, int n, Scalar total, int draws, Split split,
+template <class Scalar, class Split, class Positions>
+inline void count_positions(Scalar* w, int n, Scalar total, int draws, Split split,
                             Positions positions) {
   Scalar reached = Scalar(0);
   Scalar position = Scalar(0);
@@ -55,9 +55,9 @@ struct WholeWeight {
   }
 };
 
-template <class Weights>
-inline typename Weights::value_type total_weight(const Weights& w, int n) {
-  typename Weights::value_type total = w[0];
+template <class Scalar>
+inline Scalar total_weight(const Scalar* w, int n) {
+  Scalar total = w[0];
   for (int i = 1; i < n; ++i) total = total + w[i];
   return total;
 }
@@ -66,9 +66,8 @@ inline typename Weights::value_type total_weight(const Weights& w, int n) {
 
 /// One draw for all: positions (k + u) / n. The least variance of the four, and the fastest.
 struct SystematicResampling {
-  template <class Weights>
-  static void count(Weights& w, int n, math::Random& random) {
-    using Scalar = typename Weights::value_type;
+  template <class Scalar>
+  static void count(Scalar* w, int n, math::Random& random) {
     const Scalar total = detail::total_weight(w, n);
     const Scalar offset = random.uniform<Scalar>();
     const Scalar step = Scalar(1) / Scalar(n);
@@ -79,9 +78,8 @@ struct SystematicResampling {
 
 /// One draw for each of n equal strata: positions (k + u_k) / n.
 struct StratifiedResampling {
-  template <class Weights>
-  static void count(Weights& w, int n, math::Random& random) {
-    using Scalar = typename Weights::value_type;
+  template <class Scalar>
+  static void count(Scalar* w, int n, math::Random& random) {
     const Scalar total = detail::total_weight(w, n);
     const Scalar step = Scalar(1) / Scalar(n);
     detail::count_positions(w, n, total, n, detail::WholeWeight(), [&random, step](int k) {
@@ -126,9 +124,8 @@ struct FractionOfWeight {
 
 /// n independent draws.
 struct MultinomialResampling {
-  template <class Weights>
-  static void count(Weights& w, int n, math::Random& random) {
-    using Scalar = typename Weights::value_type;
+  template <class Scalar>
+  static void count(Scalar* w, int n, math::Random& random) {
     const Scalar total = detail::total_weight(w, n);
     detail::count_positions(w, n, total, n, detail::WholeWeight(),
                             detail::SortedUniforms<Scalar>(n, random));
@@ -137,9 +134,8 @@ struct MultinomialResampling {
 
 /// The whole part of n w for certain, the rest by independent draws from the fractions.
 struct ResidualResampling {
-  template <class Weights>
-  static void count(Weights& w, int n, math::Random& random) {
-    using Scalar = typename Weights::value_type;
+  template <class Scalar>
+  static void count(Scalar* w, int n, math::Random& random) {
     const Scalar total = detail::total_weight(w, n);
     const Scalar scale = Scalar(n) / total;
     Scalar fractions = Scalar(0);
@@ -157,16 +153,17 @@ struct ResidualResampling {
 };
 
 /// Copies each particle over the dead as often as its count says. A particle that goes on stays
-/// where it is. In: the log weight fields hold the counts. Out: equal weights.
+/// where it is. In: the places of the log weights hold the counts. Out: equal weights.
 template <class Set>
 inline void redistribute(const Set& set) {
   using Scalar = typename Set::Scalar;
+  Scalar* counts = set.log_weights();
   int dead = 0;
   for (int i = 0; i < set.size(); ++i) {
-    for (Scalar count = set.log_weight(i); count > Scalar(1); count = count - Scalar(1)) {
-      while (set.log_weight(dead) > Scalar(0)) ++dead;
+    for (Scalar count = counts[i]; count > Scalar(1); count = count - Scalar(1)) {
+      while (counts[dead] > Scalar(0)) ++dead;
       set.copy(i, dead);
-      set.log_weight(dead) = Scalar(1);
+      counts[dead] = Scalar(1);
     }
   }
   set.fill_block();
@@ -175,10 +172,10 @@ inline void redistribute(const Set& set) {
 
 /// Resamples the normalised set by the policy.
 template <class Policy, class Set>
-inline void resample(const Set& set, math::Random& random) {
-  for (int i = 0; i < set.size(); ++i) set.log_weight(i) = weight_of(set.log_weight(i));
-  typename Set::Field weights = set.field(Set::kLogWeight);
-  Policy::count(weights, set.size(), random);
+inline void resample(const Policy& policy, const Set& set, math::Random& random) {
+  typename Set::Scalar* weights = set.log_weights();
+  for (int i = 0; i < set.size(); ++i) weights[i] = weight_of(weights[i]);
+  policy.count(weights, set.size(), random);
   redistribute(set);
 }
 

@@ -18,14 +18,15 @@
 #pragma once
 
 #include "auvest/filters/square_root_update.hpp"
-#include "auvest/math/angle.hpp"
 #include "auvest/math/counter_random.hpp"
 #include "auvest/math/linear_algebra.hpp"
-#include "auvest/math/trigonometry.hpp"
+#include "auvest/math/twin.hpp"
 #include "auvest/particles/log_weights.hpp"
+#include "auvest/particles/mixture.hpp"
 #include "auvest/particles/particle_set.hpp"
 #include "auvest/particles/resampling.hpp"
-#include "auvest/particles/weighted_means.hpp"
+#include "auvest/slat/association.hpp"
+#include "auvest/slat/master_bank.hpp"
 #include "auvest/slat/proposals.hpp"
 #include "auvest/slat/sighting.hpp"
 #include "auvest/status.hpp"
@@ -66,12 +67,12 @@ class Slatf {
   using MasterBelief = Belief<Scalar, 6>;
   using VelocityChange = Vector<Scalar, 2>;
 
-  // The fields of a particle: log weight, pose, its covariance (2.0), and the masters, each with
-  // six states and the lower triangle of their covariance.
-  static constexpr int kPoseField = 1;
-  static constexpr int kPoseNumbers = kPose + (Proposal::kInformed ? kPose * (kPose + 1) / 2 : 0);
+  // The fields of a particle: pose, its covariance (2.0), and the masters (master_bank.hpp).
+  static constexpr int kPoseField = 0;
+  static constexpr int kPoseNumbers = kPose + (Proposal::kInformed ? triangle_numbers(kPose) : 0);
   static constexpr int kMasterField = kPoseField + kPoseNumbers;
-  static constexpr int kMasterNumbers = 6 + 21;
+  using Bank = MasterBank<Master, Lanes>;
+  static constexpr int kMasterNumbers = Bank::kNumbers;
   using Set = ParticleSet<Scalar, kMasterField + Masters * kMasterNumbers>;
   template <int Capacity>
   using Storage = ParticleStorage<Scalar, Set::kFields, Capacity>;
@@ -79,13 +80,21 @@ class Slatf {
   /// The particles live in `storage`, which holds at least Set::storage_size(capacity) numbers and
   /// must outlive the filter.
   Slatf(const Motion& motion, const Master& master, const Params& params, Scalar* storage,
-        int capacity)
-      : motion_(motion), master_(master), params_(params), set_(storage, capacity) {}
+        int capacity, const Resampling& resampling = Resampling())
+      : motion_(motion),
+        master_(master),
+        params_(params),
+        set_(storage, capacity),
+        resampling_(resampling) {}
 
   template <int Capacity>
   Slatf(const Motion& motion, const Master& master, const Params& params,
-        ParticleStorage<Scalar, Set::kFields, Capacity>& storage)
-      : Slatf(motion, master, params, storage.numbers, Capacity) {}
+        ParticleStorage<Scalar, Set::kFields, Capacity>& storage,
+        const Resampling& resampling = Resampling())
+      : Slatf(motion, master, params, storage.numbers, Capacity, resampling) {}
+
+  /// A copy of `other` that goes on with the copy of its particles that lies in `storage`.
+  Slatf(const Slatf& other, Scalar* storage) : Slatf(other) { set_ = Set(storage, other.set_); }
 
   /// Draws the poses of `particles` particles from N(pose.x, pose.P); there is no master yet. P may
   /// be singular or zero.
@@ -121,7 +130,7 @@ class Slatf {
         drawn.x(k) = Value(pose.x(k));
         for (int l = 0; l < kPose; ++l) spread(k, l) = Value(root(k, l));
       }
-      draw(key, i, spread, drawn.x);
+      draw<Lanes>(key, i, spread, drawn.x);
       store_pose(i, drawn);
     });
     return Status::kOk;
@@ -143,8 +152,7 @@ class Slatf {
       copy.x(k) = Value(belief.x(k));
       for (int l = 0; l <= k; ++l) copy.P(k, l) = Value(belief.P(k, l));
     }
-    const int field = master_field(masters_);
-    for_each([&](int i) { store(i, field, copy); });
+    for_each([&](int i) { Bank::begin(master_, copy, master_at(i, masters_)); });
     ++masters_;
     return Status::kOk;
   }
@@ -157,7 +165,7 @@ class Slatf {
     const Status status = check(dt, u, changes);
     if (status != Status::kOk) return status;
     const Move move(motion_.step(u, dt), dt, changes, random);
-    for_each([&](int i) { advance(i, move); });
+    for_each_tile([&](int begin, int end) { advance(begin, end, move); });
     return Status::kOk;
   }
 
@@ -175,7 +183,7 @@ class Slatf {
       int left = 0;
       for (int s = 0; s < count; ++s) {
         if (births() && sightings[s].master == kUnknownMaster && is_lonely(echoes, s)) {
-          give_birth(echoes, s);
+          add_master(echoes, s);
         } else {
           old[left++] = sightings[s];
         }
@@ -184,7 +192,7 @@ class Slatf {
       echoes.count = left;
       if (left == 0) return Status::kOk;
     }
-    for_each([&](int i) { take_in(i, echoes); });
+    for_each_tile([&](int begin, int end) { take_in(begin, end, echoes); });
     conclude(echoes.count, random);
     return Status::kOk;
   }
@@ -202,9 +210,9 @@ class Slatf {
     }
     const Move move(motion_.step(u, dt), dt, changes, random);
     const Echoes echoes(sightings, count, sonar, random);
-    for_each([&](int i) {
-      advance(i, move);
-      take_in(i, echoes);
+    for_each_tile([&](int begin, int end) {
+      advance(begin, end, move);
+      take_in(begin, end, echoes);
     });
     conclude(count, random);
     return Status::kOk;
@@ -212,73 +220,59 @@ class Slatf {
 
   /// Mean and covariance of the slave's pose; the heading's mean is that of unit vectors.
   SlaveBelief slave() const {
-    using math::sincos;
-    using math::wrap;
-    Vector<Scalar, kPose> origin;
-    for (int k = 0; k < kPose; ++k) origin(k) = *set_.at(0, kPoseField + k);
-    const bool heading = kPose > 2;
-    Scalar mean[kPose + 1];
-    weighted_means<Lanes>(
-        set_,
-        [&](int i, Value(&q)[kPose + 1]) {
-          for (int k = 0; k < 2; ++k) q[k] = pose_number(i, k) - Value(origin(k));
-          q[kPose] = Value(0);
-          if (heading) {
-            sincos(Value(pose_number(i, kPose - 1) - Value(origin(kPose - 1))), q[kPose],
-                   q[kPose - 1]);
-          }
-        },
-        mean);
-    SlaveBelief belief;
-    for (int k = 0; k < 2; ++k) belief.x(k) = origin(k) + mean[k];
-    if (heading) {
-      belief.x(kPose - 1) =
-          math::wrap(Scalar(origin(kPose - 1) + math::atan2(mean[kPose], mean[kPose - 1])));
-    }
-
-    constexpr int kTriangle = kPose * (kPose + 1) / 2;
-    Scalar covariance[kTriangle];
-    weighted_means<Lanes>(
-        set_,
-        [&](int i, Value(&q)[kTriangle]) {
-          Belief<Value, kPose> pose;
-          load_pose(i, pose);
-          for (int k = 0; k < kPose; ++k) pose.x(k) = pose.x(k) - Value(belief.x(k));
-          if (heading) pose.x(kPose - 1) = wrap(Value(pose.x(kPose - 1)));
-          square(pose, Proposal::kInformed, q);
-        },
-        covariance);
-    unpack(covariance, belief.P);
-    return belief;
+    return summarise<Lanes, kPose, Proposal::kInformed, (kPose > 2)>(set_, kPoseField);
   }
 
   /// Mean and covariance of master n.
   MasterBelief master(int n) const {
-    Vector<Scalar, 6> origin;
-    for (int k = 0; k < 6; ++k) origin(k) = *set_.at(0, master_field(n) + k);
-    Scalar mean[6];
+    return summarise<Lanes, 6, true, false>(set_, master_field(n));
+  }
+
+  /// With an Imm as Master: the probability that its model k moves master n.
+  Scalar mode_probability(int n, int k) const {
+    Scalar mean[1];
+    weighted_means<Lanes>(
+        set_, [&](int i, Value(&q)[1]) { q[0] = Bank::probability(master_at(i, n), k); }, mean);
+    return mean[0];
+  }
+
+  /// Means of the positions [m].
+  struct Positions {
+    Vector<Scalar, 2> slave;
+    Vector<Scalar, 2> masters[Masters];
+  };
+
+  /// All that slave() and master() say of positions but the covariances, in one pass over fewer
+  /// fields: for every step.
+  Positions positions() const {
+    constexpr int kNumbers = 2 + 2 * Masters;
+    constexpr int kAhead = 16;  // blocks, read so sparsely that no cache foresees it
+    int fields[kNumbers];
+    Scalar origin[kNumbers];
+    for (int k = 0; k < 2; ++k) {
+      fields[k] = kPoseField + k;
+      for (int n = 0; n < Masters; ++n) fields[2 + 2 * n + k] = master_field(n) + k;
+    }
+    for (int k = 0; k < kNumbers; ++k) origin[k] = *set_.at(0, fields[k]);
+    Scalar mean[kNumbers];
     weighted_means<Lanes>(
         set_,
-        [&](int i, Value(&q)[6]) {
-          const Scalar* from = set_.at(i, master_field(n));
-          for (int k = 0; k < 6; ++k) q[k] = Lanes::load(from + k * kBlock) - Value(origin(k));
+        [&](int i, Value(&q)[kNumbers]) {
+          for (int k = 0; k < kNumbers; ++k) {
+            const Scalar* number = set_.at(i, fields[k]);
+            q[k] = Lanes::load(number) - Value(origin[k]);
+            Lanes::prefetch(number + kAhead * Set::kFields * kBlock);
+          }
         },
         mean);
-    MasterBelief belief;
-    for (int k = 0; k < 6; ++k) belief.x(k) = origin(k) + mean[k];
-
-    Scalar covariance[21];
-    weighted_means<Lanes>(
-        set_,
-        [&](int i, Value(&q)[21]) {
-          Belief<Value, 6> each;
-          load(i, master_field(n), each);
-          for (int k = 0; k < 6; ++k) each.x(k) = each.x(k) - Value(belief.x(k));
-          square(each, true, q);
-        },
-        covariance);
-    unpack(covariance, belief.P);
-    return belief;
+    Positions result;
+    for (int k = 0; k < 2; ++k) {
+      result.slave(k) = origin[k] + mean[k];
+      for (int n = 0; n < Masters; ++n) {
+        result.masters[n](k) = origin[2 + 2 * n + k] + mean[2 + 2 * n + k];
+      }
+    }
+    return result;
   }
 
   int particles() const { return set_.size(); }
@@ -291,95 +285,94 @@ class Slatf {
  private:
   using Value = typename Lanes::Value;
 
+  // A step of the filter is a long chain of roots and quotients that wait for each other. So it is
+  // taken in parts, each for all groups of a tile in turn, and the parts that wait take two groups
+  // side by side: the processor has something to do, and the tile stays in the cache.
+  static constexpr int kTileGroups = Lanes::kPairs ? 4 : 1;
+  static constexpr int kTile = kTileGroups * Lanes::kWidth;
+  static constexpr int kNearParticles = 10000;  // fit into a second-level cache
+
+  /// One group of particles, or two that lie behind each other.
+  struct Single {
+    using Fields = Lanes;
+    using Weights = Lanes;
+  };
+  struct Pair {
+    using Weights = typename Lanes::template Pair<Lanes::kWidth>;
+    using Fields = typename Lanes::template Pair<(Lanes::kWidth < kBlock) ? Lanes::kWidth
+                                                                          : Set::kFields * kBlock>;
+  };
+
+  template <class Kernel>
+  AUVEST_INLINE void for_each_tile(const Kernel& kernel) const {
+    for (int begin = 0; begin < set_.size(); begin += kTile) {
+      kernel(begin, begin + kTile < set_.size() ? begin + kTile : set_.size());
+    }
+  }
+
+  /// True if at i a pair of groups begins that ends before the particle `end`.
+  static AUVEST_INLINE bool is_pair(int i, int end) {
+    return Lanes::kPairs && i + Lanes::kWidth < end;
+  }
+
   template <class Kernel>
   AUVEST_INLINE void for_each(const Kernel& kernel) const {
     for (int i = 0; i < set_.size(); i += Lanes::kWidth) kernel(i);
   }
 
   /// Without a gate, one that no NIS of check_sightings() reaches.
-  Value gate() const { return Value(params_.gate > Scalar(0) ? params_.gate : Scalar(1e35)); }
+  Scalar gate() const { return params_.gate > Scalar(0) ? params_.gate : Scalar(1e35); }
 
   static int master_field(int n) { return kMasterField + n * kMasterNumbers; }
 
-  template <int N>
-  AUVEST_INLINE void load(int i, int field, Belief<Value, N>& belief) const {
-    const Scalar* from = set_.at(i, field);
-    int offset = 0;
-    AUVEST_UNROLL
-    for (int k = 0; k < N; ++k, offset += kBlock) belief.x(k) = Lanes::load(from + offset);
-    AUVEST_UNROLL
-    for (int k = 0; k < N; ++k) {
-      AUVEST_UNROLL
-      for (int l = 0; l <= k; ++l, offset += kBlock) belief.P(k, l) = Lanes::load(from + offset);
-    }
-  }
-
-  template <int N>
-  AUVEST_INLINE void store(int i, int field, const Belief<Value, N>& belief) const {
-    Scalar* to = set_.at(i, field);
-    int offset = 0;
-    AUVEST_UNROLL
-    for (int k = 0; k < N; ++k, offset += kBlock) Lanes::store(to + offset, belief.x(k));
-    AUVEST_UNROLL
-    for (int k = 0; k < N; ++k) {
-      AUVEST_UNROLL
-      for (int l = 0; l <= k; ++l, offset += kBlock) Lanes::store(to + offset, belief.P(k, l));
-    }
-  }
-
-  AUVEST_INLINE void load_pose(int i, Belief<Value, kPose>& pose) const {
+  template <class Fields = Lanes>
+  AUVEST_INLINE void load_pose(int i, Belief<typename Fields::Value, kPose>& pose) const {
     if (Proposal::kInformed) {
-      load(i, kPoseField, pose);
+      load_belief<Fields>(set_.at(i, kPoseField), pose);
     } else {
-      const Scalar* from = set_.at(i, kPoseField);
-      for (int k = 0; k < kPose; ++k) pose.x(k) = Lanes::load(from + k * kBlock);
+      load_mean<Fields>(set_.at(i, kPoseField), pose.x);
     }
   }
 
-  AUVEST_INLINE void store_pose(int i, const Belief<Value, kPose>& pose) const {
+  template <class Fields = Lanes>
+  AUVEST_INLINE void store_pose(int i, const Belief<typename Fields::Value, kPose>& pose) const {
     if (Proposal::kInformed) {
-      store(i, kPoseField, pose);
+      store_belief<Fields>(set_.at(i, kPoseField), pose);
     } else {
-      Scalar* to = set_.at(i, kPoseField);
-      for (int k = 0; k < kPose; ++k) Lanes::store(to + k * kBlock, pose.x(k));
+      store_mean<Fields>(set_.at(i, kPoseField), pose.x);
     }
   }
 
-  AUVEST_INLINE Value pose_number(int i, int k) const {
-    return Lanes::load(set_.at(i, kPoseField + k));
+  AUVEST_INLINE Scalar* master_at(int i, int n) const { return set_.at(i, master_field(n)); }
+
+  template <class Fields = Lanes>
+  AUVEST_INLINE void load_master(int i, int n, Belief<typename Fields::Value, 6>& master) const {
+    load_belief<Fields>(set_.at(i, master_field(n)), master);
   }
 
-  /// The lower triangle of x x', plus P where it counts.
-  template <int N, int Count>
-  static AUVEST_INLINE void square(const Belief<Value, N>& belief, bool with_covariance,
-                                   Value (&triangle)[Count]) {
-    int at = 0;
-    for (int k = 0; k < N; ++k) {
-      for (int l = 0; l <= k; ++l, ++at) {
-        triangle[at] = belief.x(k) * belief.x(l);
-        if (with_covariance) triangle[at] = triangle[at] + belief.P(k, l);
-      }
-    }
+  AUVEST_INLINE void store_master(int i, int n, const Belief<Value, 6>& master) const {
+    store_belief<Lanes>(set_.at(i, master_field(n)), master);
   }
 
-  template <int N, int Count>
-  static void unpack(const Scalar (&triangle)[Count], Matrix<Scalar, N, N>& p) {
-    int at = 0;
-    for (int k = 0; k < N; ++k) {
-      for (int l = 0; l <= k; ++l, ++at) p(k, l) = p(l, k) = triangle[at];
-    }
+  /// Multiplies the weights from particle i on.
+  template <class Weights = Lanes>
+  AUVEST_INLINE void multiply_weight(int i, const typename Weights::Value& log_factor) const {
+    Scalar* at = set_.log_weights() + i;
+    Weights::store(at, Weights::load(at) + log_factor);
   }
 
   /// x <- x + root e, e ~ N(0, I).
+  template <class Fields, class V>
   static AUVEST_INLINE void draw(const math::CounterKey& key, int i,
-                                 const Matrix<Value, kPose, kPose>& root, Vector<Value, kPose>& x) {
-    Value e[kPose + 1];
+                                 const Matrix<V, kPose, kPose>& root, Vector<V, kPose>& x) {
+    V e[kPose + 1];
     for (int k = 0; k < kPose; k += 2) {
-      math::counter_normal_pair(key, Lanes::index(i), static_cast<uint32_t>(k / 2), e[k], e[k + 1]);
+      math::counter_normal_pair(key, Fields::index(i), static_cast<uint32_t>(k / 2), e[k],
+                                e[k + 1]);
     }
     AUVEST_UNROLL
     for (int k = 0; k < kPose; ++k) {
-      Value sum = root(k, 0) * e[0];
+      V sum = root(k, 0) * e[0];
       AUVEST_UNROLL
       for (int l = 1; l < kPose; ++l) sum = sum + root(k, l) * e[l];
       x(k) = x(k) + sum;
@@ -403,16 +396,18 @@ class Slatf {
     const Sighting<Scalar>* sightings;
     int count;
     const Sonar<Scalar>& sonar;
-    Matrix<Value, 2, 2> noise;
     math::CounterKey key;
 
     Echoes(const Sighting<Scalar>* heard, int number, const Sonar<Scalar>& device,
            math::Random& random)
-        : sightings(heard),
-          count(number),
-          sonar(device),
-          noise(device.template R<Value>()),
-          key(random) {}
+        : sightings(heard), count(number), sonar(device), key(random) {}
+
+    bool all_known() const {
+      for (int s = 0; s < count; ++s) {
+        if (sightings[s].master == kUnknownMaster) return false;
+      }
+      return true;
+    }
   };
 
   Status check(Scalar dt, const Control& u, const VelocityChange* changes) const {
@@ -430,179 +425,302 @@ class Slatf {
 
   bool births() const { return params_.birth_velocity_mps > Scalar(0) && masters_ < Masters; }
 
-  AUVEST_INLINE void advance(int i, const Move& move) const {
-    Belief<Value, kPose> pose;
-    load_pose(i, pose);
-    Value a(0);
-    Value b(0);
-    if (!Proposal::kInformed) math::counter_normal_pair(move.key, Lanes::index(i), 0u, a, b);
+  AUVEST_INLINE void advance(int begin, int end, const Move& move) const {
+    // The poses take as long as the masters' way to the cache, where that is far.
+    if (Lanes::kPairs && set_.size() > kNearParticles) {
+      for (int block = begin; block < end; block += kBlock) {
+        for (int f = 0; f < Set::kFields; ++f) Lanes::prefetch(set_.at(block, f));
+      }
+    }
+    int i = begin;
+    for (; is_pair(i, end); i += 2 * Lanes::kWidth) advance_pose<Pair>(i, move);
+    for (; i < end; i += Lanes::kWidth) advance_pose<Single>(i, move);
+    for (i = begin; i < end; i += Lanes::kWidth) advance_masters(i, move);
+  }
+
+  template <class Group>
+  void advance_pose(int i, const Move& move) const {
+    using Fields = typename Group::Fields;
+    using V = typename Fields::Value;
+    Belief<V, kPose> pose;
+    load_pose<Fields>(i, pose);
+    V a(0);
+    V b(0);
+    if (!Proposal::kInformed) math::counter_normal_pair(move.key, Fields::index(i), 0u, a, b);
     Proposal::predict(motion_, move.step, a, b, pose);
-    store_pose(i, pose);
+    store_pose<Fields>(i, pose);
+  }
+
+  void advance_masters(int i, const Move& move) const {
     for (int n = 0; n < masters_; ++n) {
-      Belief<Value, 6> master;
-      load(i, master_field(n), master);
-      master_.propagate(master, move.dt);  // Eqs. (15) and (16)
-      if (move.changes != nullptr) add_planned_change(move.changes[n], move.dt, master.x);
-      store(i, master_field(n), master);
+      const VelocityChange* change = move.changes != nullptr ? move.changes + n : nullptr;
+      Bank::predict(master_, move.dt, change, master_at(i, n));
     }
   }
 
-  /// The position of master n: mean, and root of its covariance.
-  struct Place {
-    Vector<Value, 2> x;
-    Matrix<Value, 2, 2> root;
-  };
+  template <class V>
+  using View = typename Sonar<Scalar>::template View<V, kPose>;
 
-  AUVEST_INLINE Place position(int i, int n) const {
-    const Scalar* from = set_.at(i, master_field(n));
-    Place place;
-    Matrix<Value, 2, 2> p;
-    Matrix<Value, 1, 2> no_others;
-    place.x(0) = Lanes::load(from);
-    place.x(1) = Lanes::load(from + kBlock);
-    p(0, 0) = Lanes::load(from + 6 * kBlock);
-    p(1, 0) = Lanes::load(from + 7 * kBlock);
-    p(1, 1) = Lanes::load(from + 8 * kBlock);
-    math::factor_leading(p, place.root, no_others);
-    return place;
+  template <class Fields = Lanes>
+  AUVEST_INLINE Place<typename Fields::Value> place(int i, int n) const {
+    return load_place<Fields>(set_.at(i, master_field(n)));
   }
 
-  using View = typename Sonar<Scalar>::template View<Value, kPose>;
-
-  struct Score {
-    Value nis;
-    Value log_density;
-  };
-
-  /// NIS and density of a sighting, were it an echo of a master at `place`: by S of Eq. (23), or
-  /// for 2.0 by L of Eq. (65).
-  AUVEST_INLINE Score score(const Place& place, const Belief<Value, kPose>& pose,
-                            const Echoes& echoes, int s) const {
-    View view;
-    echoes.sonar.look(pose.x, place.x(0), place.x(1), echoes.sightings[s].z, view);
-    Matrix<Value, 2, 2> noise = echoes.noise;
-    if (Proposal::kInformed) {
-      Matrix<Value, kPose, kPose> root;
-      Matrix<Value, 1, kPose> no_others;
-      Matrix<Value, 2, kPose> by_slave;
-      math::factor_leading<math::DropLostPivots>(pose.P, root, no_others);
-      project(view.by_slave, root, by_slave);
-      innovation_covariance(by_slave, echoes.noise, noise);
-      math::ldlt(noise);
-    }
-    Matrix<Value, 2, 2> by_master;
-    project(view.by_master, place.root, by_master);
-    Posterior<Value, 2> posterior;
-    const math::Mask<Value> valid = potter(by_master, noise, view.innovation, posterior);
-    Score result;
-    result.nis = posterior.nis;
-    result.log_density = log_density(valid, posterior, noise);
-    return result;
+  AUVEST_INLINE Score<Value> score_master(int i, int n, const Belief<Value, kPose>& pose,
+                                          const Echoes& echoes, int s) const {
+    return score(echoes.sonar, echoes.sightings[s].z, place(i, n), pose, Proposal::kInformed);
   }
 
-  static AUVEST_INLINE math::Mask<Value> is(const Value& chosen, int n) {
-    return chosen > Value(Scalar(n) - Scalar(0.5)) && chosen < Value(Scalar(n) + Scalar(0.5));
-  }
-
-  /// The number of the master that is likeliest to have sent sighting s, of those that none of the
-  /// sightings before it has in this particle.
+  /// The number of the master that is likeliest to have sent sighting s, of those that no other
+  /// sighting has in this particle.
   AUVEST_INLINE Value nearest(int i, const Belief<Value, kPose>& pose, const Echoes& echoes, int s,
                               const Value* chosen) const {
     using math::select;
     Value best = Value(no_log_weight<Scalar>());
     Value who = Value(Scalar(-1));
     for (int n = 0; n < masters_; ++n) {
-      const Value density = score(position(i, n), pose, echoes, s).log_density;
+      const Value density = score_master(i, n, pose, echoes, s).log_density;
       math::Mask<Value> better = density > best;
-      for (int earlier = 0; earlier < s; ++earlier) better = better && !is(chosen[earlier], n);
+      for (int other = 0; other < echoes.count; ++other) {
+        better = better && !is_master(chosen[other], n);
+      }
       best = select(better, density, best);
       who = select(better, Value(n), who);
     }
     return who;
   }
 
-  /// All that the echoes do to the particles from i on: association, proposal and draw (2.0),
-  /// weight, masters.
-  AUVEST_INLINE void take_in(int i, const Echoes& echoes) const {
+  /// What an echo says of a master in a group of particles.
+  template <class V>
+  struct Verdict {
+    Matrix<V, 2, 2> root;   ///< of the covariance of the master's position
+    Matrix<V, 4, 2> slope;  ///< of the other states on the position
+    Posterior<V, 2> posterior;
+    math::Mask<V> valid;
+  };
+
+  /// All that the echoes do to a tile: association, proposal and draw (2.0), weight, masters.
+  AUVEST_INLINE void take_in(int begin, int end, const Echoes& echoes) const {
+    Value chosen[kTileGroups][Masters];
+    const bool all_known = echoes.all_known();
+    int i = begin;
+    if (!all_known) {
+      for (; i < end; i += Lanes::kWidth) adjust_pose(i, echoes, chosen[group(begin, i)]);
+    } else if (Proposal::kInformed) {
+      for (; is_pair(i, end); i += 2 * Lanes::kWidth) propose<Pair>(i, echoes);
+      for (; i < end; i += Lanes::kWidth) propose<Single>(i, echoes);
+    }
+    for (int s = 0; s < echoes.count; ++s) {
+      const int known = echoes.sightings[s].master;
+      if (known != kUnknownMaster) {
+        take_in(begin, end, known, echoes, s, nullptr);
+      } else {
+        for (int n = 0; n < masters_; ++n) take_in(begin, end, n, echoes, s, chosen);
+      }
+    }
+  }
+
+  /// Sighting s as an echo of master n; where it is not known whose it is, in those particles that
+  /// have chosen n.
+  AUVEST_INLINE void take_in(int begin, int end, int n, const Echoes& echoes, int s,
+                             const Value (*chosen)[Masters]) const {
+    int i = begin;
+    if (Bank::kModes > 1) {
+      for (; i < end; i += Lanes::kWidth) {
+        math::Mask<Value> mine = math::Mask<Value>();
+        if (chosen != nullptr) mine = is_master(chosen[group(begin, i)][s], n);
+        correct_models(i, n, echoes, s, chosen != nullptr ? &mine : nullptr);
+      }
+      return;
+    }
+    Verdict<Value> verdicts[kTileGroups];
+    if (chosen == nullptr) {
+      for (; is_pair(i, end); i += 2 * Lanes::kWidth) {
+        weigh_known<Pair>(i, n, echoes, s, &verdicts[group(begin, i)]);
+      }
+      for (; i < end; i += Lanes::kWidth) {
+        weigh_known<Single>(i, n, echoes, s, &verdicts[group(begin, i)]);
+      }
+    } else {
+      for (; i < end; i += Lanes::kWidth) {
+        const int g = group(begin, i);
+        weigh_chosen(i, n, echoes, s, is_master(chosen[g][s], n), verdicts[g]);
+      }
+    }
+    for (i = begin; i < end; i += Lanes::kWidth) correct(i, n, verdicts[group(begin, i)]);
+  }
+
+  static AUVEST_INLINE int group(int begin, int i) { return (i - begin) / Lanes::kWidth; }
+
+  /// 2.0 where the masters of all echoes are known: proposal, weight and draw.
+  template <class Group>
+  void propose(int i, const Echoes& echoes) const {
+    using Fields = typename Group::Fields;
+    using V = typename Fields::Value;
+    Belief<V, kPose> pose;
+    load_pose<Fields>(i, pose);
+    V log_weight(0);
+    Matrix<V, kPose, kPose> root;
+    math::set_zero(root);
+    for (int s = 0; s < echoes.count; ++s) {
+      const Place<V> source = place<Fields>(i, echoes.sightings[s].master);
+      View<V> view;
+      echoes.sonar.look(pose.x, source.x(0), source.x(1), echoes.sightings[s].z, view);  // Eq. (51)
+      log_weight = log_weight + MeasurementProposal::refine(view, echoes.sonar.template R<V>(),
+                                                            source.root, V(gate()), pose, root);
+    }
+    multiply_weight<typename Group::Weights>(i, log_weight);
+    draw_pose<Fields>(i, echoes.key, root, pose);
+  }
+
+  template <class Fields, class V>
+  AUVEST_INLINE void draw_pose(int i, const math::CounterKey& key,
+                               const Matrix<V, kPose, kPose>& root, Belief<V, kPose>& pose) const {
+    draw<Fields>(key, i, root, pose.x);
+    if (!params_.carry_covariance) math::set_zero(pose.P);
+    store_pose<Fields>(i, pose);
+  }
+
+  /// Finds out whose each echo is; for 2.0 what propose() does.
+  void adjust_pose(int i, const Echoes& echoes, Value (&chosen)[Masters]) const {
     using math::select;
     Belief<Value, kPose> pose;
     load_pose(i, pose);
-    Value log_weight = Lanes::load(&set_.log_weight(i));
-    Value chosen[Masters];
-    for (Value& who : chosen) who = Value(Scalar(-1));
+    Value log_weight(0);
+    for (int s = 0; s < echoes.count; ++s) chosen[s] = Value(Scalar(echoes.sightings[s].master));
     Matrix<Value, kPose, kPose> root;
     math::set_zero(root);
     for (int s = 0; s < echoes.count; ++s) {
       const int known = echoes.sightings[s].master;
-      chosen[s] = known == kUnknownMaster ? nearest(i, pose, echoes, s, chosen) : Value(known);
+      if (known == kUnknownMaster) chosen[s] = nearest(i, pose, echoes, s, chosen);
       if (!Proposal::kInformed) continue;
-      Place place = position(i, known == kUnknownMaster ? 0 : known);
+      Place<Value> source = place(i, known == kUnknownMaster ? 0 : known);
       for (int n = 1; known == kUnknownMaster && n < masters_; ++n) {
-        const Place other = position(i, n);
-        const math::Mask<Value> mine = is(chosen[s], n);
-        math::copy_where(mine, other.x, place.x);
-        math::copy_where(mine, other.root, place.root);
+        const Place<Value> other = place(i, n);
+        const math::Mask<Value> mine = is_master(chosen[s], n);
+        math::copy_where(mine, other.x, source.x);
+        math::copy_where(mine, other.root, source.root);
       }
-      View view;
-      echoes.sonar.look(pose.x, place.x(0), place.x(1), echoes.sightings[s].z, view);  // Eq. (51)
-      if (known != kUnknownMaster) {
-        log_weight = log_weight + MeasurementProposal::refine(view, echoes.noise, place.root,
-                                                              gate(), pose, root);
-      } else {
-        // With more echoes than masters an echo may have none: it says nothing.
-        const math::Mask<Value> any = chosen[s] > Value(-0.5);
-        const Value limit = select(any, gate(), Value(0));
-        const Value density =
-            MeasurementProposal::refine(view, echoes.noise, place.root, limit, pose, root);
-        log_weight = log_weight + select(any, density, Value(0));
-      }
+      // With more echoes than masters an echo may have none: it says nothing.
+      const math::Mask<Value> any = chosen[s] > Value(-0.5);
+      const Value limit = select(any, Value(gate()), Value(0));
+      View<Value> view;
+      echoes.sonar.look(pose.x, source.x(0), source.x(1), echoes.sightings[s].z, view);
+      const Value density = MeasurementProposal::refine(view, echoes.sonar.template R<Value>(),
+                                                        source.root, limit, pose, root);
+      log_weight = log_weight + select(any, density, Value(0));
     }
-    if (Proposal::kInformed) {
-      draw(echoes.key, i, root, pose.x);
-      if (!params_.carry_covariance) math::set_zero(pose.P);
-      store_pose(i, pose);
-    }
-    for (int s = 0; s < echoes.count; ++s) {
-      const int known = echoes.sightings[s].master;
-      if (known != kUnknownMaster) {
-        log_weight = log_weight + correct(i, pose, known, echoes, s, nullptr);
-      } else {
-        for (int n = 0; n < masters_; ++n) {
-          const math::Mask<Value> mine = is(chosen[s], n);
-          log_weight = log_weight + select(mine, correct(i, pose, n, echoes, s, &mine), Value(0));
-        }
-      }
-    }
-    Lanes::store(&set_.log_weight(i), log_weight);
+    if (!Proposal::kInformed) return;
+    multiply_weight(i, log_weight);
+    draw_pose<Lanes>(i, echoes.key, root, pose);
   }
 
-  /// The EKF of master n, Eqs. (18) to (26), in the lanes of `only` (null: all). Returns for 1.0
-  /// the logarithm of the weight, Eqs. (30) and (31), and 0 for 2.0, which has weighed already.
-  AUVEST_INLINE Value correct(int i, const Belief<Value, kPose>& pose, int n, const Echoes& echoes,
-                              int s, const math::Mask<Value>* only) const {
-    using math::all;
-    Belief<Value, 6> master;
-    load(i, master_field(n), master);
-    const Belief<Value, 6> before = master;
-    View view;
+  /// Sighting s as an echo of master n, Eqs. (18) to (24). Returns for 1.0 the logarithm of the
+  /// density, Eqs. (30) and (31), and 0 for 2.0, which has weighed already.
+  template <class Fields, class V>
+  AUVEST_INLINE V weigh(int i, int n, const Echoes& echoes, int s, Verdict<V>& verdict) const {
+    Belief<V, kPose> pose;
+    Belief<V, 6> master;
+    load_pose<Fields>(i, pose);
+    load_master<Fields>(i, n, master);
+    View<V> view;
     echoes.sonar.look(pose.x, master.x(0), master.x(1), echoes.sightings[s].z, view);
-    Matrix<Value, 2, 2> root;
-    Matrix<Value, 4, 2> slope;
-    const math::Mask<Value> definite = math::factor_leading(master.P, root, slope);
-    Matrix<Value, 2, 2> a;
-    project(view.by_master, root, a);
-    Matrix<Value, 2, 2> noise = echoes.noise;
-    Posterior<Value, 2> posterior;
-    math::Mask<Value> valid = potter(a, noise, view.innovation, posterior);
-    valid = valid && definite;
-    if (params_.gate > Scalar(0)) saturate(gate(), posterior);
-    valid = valid && move_belief(master, root, slope, posterior);
-    math::Mask<Value> moved = valid;
-    if (only != nullptr) moved = moved && *only;
-    if (!all(moved)) math::copy_where(!moved, before, master);
-    store(i, master_field(n), master);
-    return Proposal::kInformed ? Value(0) : log_density(valid, posterior, noise);
+    const math::Mask<V> definite = math::factor_leading(master.P, verdict.root, verdict.slope);
+    Matrix<V, 2, 2> a;
+    project(view.by_master, verdict.root, a);
+    Matrix<V, 2, 2> noise = echoes.sonar.template R<V>();
+    const math::Mask<V> finite = potter(a, noise, view.innovation, verdict.posterior);
+    verdict.valid = finite && definite;
+    if (params_.gate > Scalar(0)) saturate(V(gate()), verdict.posterior);
+    return Proposal::kInformed ? V(0) : log_density(verdict.valid, verdict.posterior, noise);
   }
+
+  /// Weighs one group, or two, by an echo of master n; writes a verdict for each.
+  template <class Group>
+  void weigh_known(int i, int n, const Echoes& echoes, int s, Verdict<Value>* verdicts) const {
+    using Fields = typename Group::Fields;
+    Verdict<typename Fields::Value> verdict;
+    const typename Fields::Value density = weigh<Fields>(i, n, echoes, s, verdict);
+    if (!Proposal::kInformed) multiply_weight<typename Group::Weights>(i, density);
+    hand_out(verdict, verdicts);
+  }
+
+  /// Weighs those particles of a group for which it is an echo of master n.
+  void weigh_chosen(int i, int n, const Echoes& echoes, int s, const math::Mask<Value>& mine,
+                    Verdict<Value>& verdict) const {
+    using math::select;
+    const Value density = weigh<Lanes>(i, n, echoes, s, verdict);
+    multiply_weight(i, select(mine, density, Value(0)));
+    verdict.valid = verdict.valid && mine;
+  }
+
+  static AUVEST_INLINE void hand_out(const Verdict<Value>& from, Verdict<Value>* to) { *to = from; }
+
+  static AUVEST_INLINE void hand_out(const Verdict<math::Twin<Value>>& from, Verdict<Value>* to) {
+    math::split(from.root, to[0].root, to[1].root);
+    math::split(from.slope, to[0].slope, to[1].slope);
+    math::split(from.posterior.y, to[0].posterior.y, to[1].posterior.y);
+    math::split(from.posterior.g, to[0].posterior.g, to[1].posterior.g);
+    to[0].valid = from.valid.a;
+    to[1].valid = from.valid.b;
+  }
+
+  /// The EKF of master n follows the verdict, Eqs. (25) and (26).
+  void correct(int i, int n, Verdict<Value>& verdict) const {
+    using math::all;
+    using math::select;
+    Belief<Value, 6> master;
+    load_master(i, n, master);
+    const math::Mask<Value> finite =
+        move_belief(master, verdict.root, verdict.slope, verdict.posterior);
+    const math::Mask<Value> moved = finite && verdict.valid;
+    if (!all(moved)) {
+      reload_belief<Lanes>(!moved, set_.at(i, master_field(n)), master);
+      const math::Mask<Value> lost = verdict.valid && !finite;  // weighs nothing
+      if (!Proposal::kInformed) multiply_weight(i, select(lost, Value(-1e20), Value(0)));
+    }
+    store_master(i, n, master);
+  }
+
+  /// The update of master n where it has several models: all at once, as their probabilities follow
+  /// from the densities. In the lanes of `only` (null: all).
+  void correct_models(int i, int n, const Echoes& echoes, int s,
+                      const math::Mask<Value>* only) const {
+    using math::select;
+    Belief<Value, kPose> pose;
+    load_pose<Lanes>(i, pose);
+    const MasterEkf ekf = {*this, pose, echoes, s};
+    const Value density = Bank::correct(ekf, only, master_at(i, n));
+    if (Proposal::kInformed) return;
+    multiply_weight(i, only == nullptr ? density : select(*only, density, Value(0)));
+  }
+
+  /// Eqs. (18) to (26) for sighting s.
+  struct MasterEkf {
+    const Slatf& slatf;
+    const Belief<Value, kPose>& pose;
+    const Echoes& echoes;
+    int s;
+
+    AUVEST_INLINE Echo<Value> operator()(Belief<Value, 6>& master) const {
+      View<Value> view;
+      echoes.sonar.look(pose.x, master.x(0), master.x(1), echoes.sightings[s].z, view);
+      Matrix<Value, 2, 2> root;
+      Matrix<Value, 4, 2> slope;
+      const math::Mask<Value> definite = math::factor_leading(master.P, root, slope);
+      Matrix<Value, 2, 2> a;
+      project(view.by_master, root, a);
+      Matrix<Value, 2, 2> noise = echoes.sonar.template R<Value>();
+      Posterior<Value, 2> posterior;
+      Echo<Value> echo;
+      echo.valid = potter(a, noise, view.innovation, posterior);
+      echo.valid = echo.valid && definite;
+      if (slatf.params_.gate > Scalar(0)) saturate(Value(slatf.gate()), posterior);
+      echo.valid = echo.valid && move_belief(master, root, slope, posterior);
+      echo.log_density = log_density(echo.valid, posterior, noise);
+      return echo;
+    }
+  };
 
   /// True if most of the weight finds sighting s beyond the gate of every master.
   bool is_lonely(const Echoes& echoes, int s) const {
@@ -611,10 +729,10 @@ class Slatf {
     for_each([&](int i) {
       Belief<Value, kPose> pose;
       load_pose(i, pose);
-      Value weight = weight_of(Lanes::load(&set_.log_weight(i)));
+      Value weight = weight_of(Lanes::load(set_.log_weights() + i));
       for (int n = 0; n < masters_; ++n) {
-        const Value nis = score(position(i, n), pose, echoes, s).nis;
-        weight = select(nis > gate(), weight, Value(0));
+        const Value nis = score_master(i, n, pose, echoes, s).nis;
+        weight = select(nis > Value(gate()), weight, Value(0));
       }
       lonely.add(i, weight);
     });
@@ -622,50 +740,28 @@ class Slatf {
   }
 
   /// A new master where each particle hears sighting s come from.
-  void give_birth(const Echoes& echoes, int s) {
-    using math::sincos;
-    const Vector<Scalar, 2>& z = echoes.sightings[s].z;
-    const typename Sonar<Scalar>::Params& sonar = echoes.sonar.params;
-    const Scalar along = sonar.sigma_range_m * sonar.sigma_range_m;
-    const Scalar across = z(0) * z(0) * sonar.sigma_bearing_rad * sonar.sigma_bearing_rad;
-    const Scalar range = sonar.bearing == Bearing::kMasterToSlave ? -z(0) : z(0);
+  void add_master(const Echoes& echoes, int s) {
     const Scalar velocity = params_.birth_velocity_mps * params_.birth_velocity_mps;
     const Scalar acceleration = params_.birth_acceleration_mps2 * params_.birth_acceleration_mps2;
     for_each([&](int i) {
       Belief<Value, kPose> pose;
       load_pose(i, pose);
-      Value direction(z(1));
-      if (sonar.bearing == Bearing::kFromHeading) direction = direction + pose.x(kPose - 1);
-      Value sine, cosine;
-      sincos(direction, sine, cosine);
       Belief<Value, 6> master;
-      math::set_zero(master.x);
-      math::set_zero(master.P);
-      master.x(0) = pose.x(0) + range * cosine;
-      master.x(1) = pose.x(1) + range * sine;
-      master.P(0, 0) = along * (cosine * cosine) + across * (sine * sine);
-      master.P(1, 0) = (along - across) * (cosine * sine);
-      master.P(1, 1) = along * (sine * sine) + across * (cosine * cosine);
-      for (int k = 0; k < 2; ++k) {
-        if (Proposal::kInformed) {
-          for (int l = 0; l <= k; ++l) master.P(k, l) = master.P(k, l) + pose.P(k, l);
-        }
-        master.P(2 + k, 2 + k) = Value(velocity);
-        master.P(4 + k, 4 + k) = Value(acceleration);
-      }
-      store(i, master_field(masters_), master);
+      give_birth(echoes.sonar, echoes.sightings[s].z, pose, Proposal::kInformed, velocity,
+                 acceleration, master);
+      Bank::begin(master_, master, master_at(i, masters_));
     });
     ++masters_;
   }
 
   /// Normalises, and resamples where few particles are left.
-  void conclude(int count, math::Random& random) {
+  AUVEST_OUTLINE void conclude(int count, math::Random& random) {
     const WeightSummary<Scalar> summary = normalise<Lanes>(set_);
     effective_size_ = summary.effective_size;
     log_likelihood_ =
         log_likelihood_ + (summary.log_sum - Scalar(count) * Scalar(1.8378770664));  // log(2 pi)
     if (effective_size_ < params_.resample_below * Scalar(set_.size())) {
-      resample<Resampling>(set_, random);
+      resample(resampling_, set_, random);
       ++resamplings_;
     }
   }
@@ -674,6 +770,7 @@ class Slatf {
   Master master_;
   Params params_;
   Set set_;
+  Resampling resampling_;
   int masters_ = 0;
   int resamplings_ = 0;
   Scalar log_likelihood_ = Scalar(0);

@@ -1,0 +1,135 @@
+// Two values side by side, each of which goes through the same operations: while one waits for a
+// root or a quotient the processor works on the other. Value: a number or a batch (simd.hpp).
+#pragma once
+
+#include <cstdint>
+
+#include "auvest/config.hpp"
+#include "auvest/math/select.hpp"
+#include "auvest/types.hpp"
+
+namespace auvest {
+namespace math {
+
+template <class Mask_>
+struct TwinMask {
+  Mask_ a, b;
+
+  TwinMask() = default;
+  AUVEST_INLINE TwinMask(const Mask_& first, const Mask_& second) : a(first), b(second) {}
+
+  friend AUVEST_INLINE TwinMask operator&&(const TwinMask& x, const TwinMask& y) {
+    return TwinMask(x.a && y.a, x.b && y.b);
+  }
+  friend AUVEST_INLINE TwinMask operator||(const TwinMask& x, const TwinMask& y) {
+    return TwinMask(x.a || y.a, x.b || y.b);
+  }
+  AUVEST_INLINE TwinMask operator!() const { return TwinMask(!a, !b); }
+  friend AUVEST_INLINE bool any(const TwinMask& x) { return any(x.a) || any(x.b); }
+  friend AUVEST_INLINE bool all(const TwinMask& x) { return all(x.a) && all(x.b); }
+};
+
+/// Two words (32-bit unsigned integers, or batches of them).
+template <class Word>
+struct TwinWord {
+  Word a, b;
+
+  explicit AUVEST_INLINE TwinWord(uint32_t word) : a(word), b(word) {}
+  AUVEST_INLINE TwinWord(const Word& first, const Word& second) : a(first), b(second) {}
+
+  friend AUVEST_INLINE TwinWord operator+(const TwinWord& x, const TwinWord& y) {
+    return TwinWord(x.a + y.a, x.b + y.b);
+  }
+  friend AUVEST_INLINE TwinWord operator^(const TwinWord& x, const TwinWord& y) {
+    return TwinWord(x.a ^ y.a, x.b ^ y.b);
+  }
+  friend AUVEST_INLINE TwinWord rotate_left(const TwinWord& x, int count) {
+    return TwinWord(rotate_left(x.a, count), rotate_left(x.b, count));
+  }
+};
+
+template <class Value>
+struct Twin {
+  using TwinMask = math::TwinMask<Mask<Value>>;
+  Value a, b;
+
+  Twin() = default;
+  AUVEST_INLINE Twin(float x) : a(x), b(x) {}  // implicit: a number is the same in both
+  explicit AUVEST_INLINE Twin(double x) : a(x), b(x) {}
+  explicit AUVEST_INLINE Twin(int x) : a(x), b(x) {}
+  AUVEST_INLINE Twin(const Value& first, const Value& second) : a(first), b(second) {}
+
+  friend AUVEST_INLINE Twin operator+(const Twin& x, const Twin& y) {
+    return Twin(x.a + y.a, x.b + y.b);
+  }
+  friend AUVEST_INLINE Twin operator-(const Twin& x, const Twin& y) {
+    return Twin(x.a - y.a, x.b - y.b);
+  }
+  friend AUVEST_INLINE Twin operator*(const Twin& x, const Twin& y) {
+    return Twin(x.a * y.a, x.b * y.b);
+  }
+  friend AUVEST_INLINE Twin operator/(const Twin& x, const Twin& y) {
+    return Twin(x.a / y.a, x.b / y.b);
+  }
+  AUVEST_INLINE Twin operator-() const { return Twin(-a, -b); }
+  friend AUVEST_INLINE TwinMask operator<(const Twin& x, const Twin& y) {
+    return TwinMask(x.a < y.a, x.b < y.b);
+  }
+  friend AUVEST_INLINE TwinMask operator>(const Twin& x, const Twin& y) {
+    return TwinMask(x.a > y.a, x.b > y.b);
+  }
+  friend AUVEST_INLINE TwinMask operator<=(const Twin& x, const Twin& y) {
+    return TwinMask(x.a <= y.a, x.b <= y.b);
+  }
+  friend AUVEST_INLINE TwinMask operator>=(const Twin& x, const Twin& y) {
+    return TwinMask(x.a >= y.a, x.b >= y.b);
+  }
+
+  friend AUVEST_INLINE Twin select(const TwinMask& condition, const Twin& yes, const Twin& no) {
+    return Twin(select(condition.a, yes.a, no.a), select(condition.b, yes.b, no.b));
+  }
+  friend AUVEST_INLINE Twin larger(const Twin& x, const Twin& y) {
+    return Twin(larger(x.a, y.a), larger(x.b, y.b));
+  }
+  friend AUVEST_INLINE TwinMask is_finite(const Twin& x) {
+    return TwinMask(is_finite(x.a), is_finite(x.b));
+  }
+  friend AUVEST_INLINE Twin sqrt(const Twin& x) { return Twin(sqrt(x.a), sqrt(x.b)); }
+  friend AUVEST_INLINE Twin exp(const Twin& x) { return Twin(exp(x.a), exp(x.b)); }
+  friend AUVEST_INLINE Twin log(const Twin& x) { return Twin(log(x.a), log(x.b)); }
+  friend AUVEST_INLINE Twin wrap(const Twin& x) { return Twin(wrap(x.a), wrap(x.b)); }
+  friend AUVEST_INLINE Twin atan2(const Twin& y, const Twin& x) {
+    return Twin(atan2(y.a, x.a), atan2(y.b, x.b));
+  }
+  friend AUVEST_INLINE void sincos(const Twin& x, Twin& s, Twin& c) {
+    sincos(x.a, s.a, c.a);
+    sincos(x.b, s.b, c.b);
+  }
+};
+
+template <class Value>
+struct ScalarOf<Twin<Value>> {
+  using Type = typename ScalarOf<Value>::Type;
+};
+
+template <class Result, class Word>
+AUVEST_INLINE Result fraction_of(const TwinWord<Word>& word) {
+  using Value = decltype(Result().a);
+  return Result(fraction_of<Value>(word.a), fraction_of<Value>(word.b));
+}
+
+template <class Value, int Rows, int Cols>
+AUVEST_INLINE void split(const Matrix<Twin<Value>, Rows, Cols>& both, Matrix<Value, Rows, Cols>& a,
+                         Matrix<Value, Rows, Cols>& b) {
+  AUVEST_UNROLL
+  for (int i = 0; i < Rows; ++i) {
+    AUVEST_UNROLL
+    for (int j = 0; j < Cols; ++j) {
+      a(i, j) = both(i, j).a;
+      b(i, j) = both(i, j).b;
+    }
+  }
+}
+
+}  // namespace math
+}  // namespace auvest
