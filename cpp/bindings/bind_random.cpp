@@ -35,6 +35,7 @@ void bind_precision(py::class_<math::Random>& c) {
 void bind_random(py::module_& m) {
   py::class_<math::Random> c(m, "Random", "xoshiro128++: the same stream on every target.");
   c.def(py::init<std::uint64_t, std::uint64_t>(), py::arg("seed"), py::arg("stream") = 0);
+  c.def("copy", [](const math::Random& random) { return random; });
   c.def("next_u32", &math::Random::next_u32, "32 random bits.");
   bind_precision<float>(c);
   bind_precision<double>(c);

@@ -21,12 +21,19 @@ void bind_status(py::module_& m);
 void bind_math(py::module_& m);
 void bind_random(py::module_& m);
 void bind_range_bearing(py::module_& m);
+void bind_dead_reckoning(py::module_& m);
+void bind_kernels(py::module_& m);
+void bind_leader_range(py::module_& m);
+void bind_robust_ekf(py::module_& m);
+void bind_robust_ukf(py::module_& m);
 void bind_intervals(py::module_& m);
 void bind_constant_acceleration(py::module_& m);
 void bind_sigma_points(py::module_& m);
 void bind_ekf(py::module_& m);
 void bind_ukf(py::module_& m);
+void bind_cooperative(py::module_& m);
 void bind_tracking(py::module_& m);
+void bind_slat(py::module_& m);
 void bind_self_test(py::module_& m);
 
 template <class Scalar>

@@ -1,0 +1,553 @@
+// The Python classes of the filters of slat/ and of their outage switch, the same for every filter,
+// motion and precision.
+#pragma once
+
+#include <algorithm>
+#include <limits>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "any_slat.hpp"
+#include "auvest/scenarios/slat.hpp"
+#include "auvest/slat/outage.hpp"
+#include "binders.hpp"
+#include "params.hpp"
+#include "slat_params.hpp"
+#include "slatf_setup.hpp"
+
+namespace auvest {
+namespace bindings {
+
+/// Names of the instruction sets that this build and this processor have, the widest last.
+std::vector<std::string> instruction_sets(bool single_precision);
+
+AnyResampling resampling_named(const std::string& name);
+
+template <class Motion>
+class SlatBinder {
+ public:
+  using Scalar = typename Motion::Scalar;
+  static constexpr int kPose = Motion::kStates;
+  using Any = AnySlat<Scalar, kPose>;
+  using Switch = Outage<Any, Any::kMasters>;
+  using Master = PiecewiseAcceleration<Scalar>;
+  using Echo = Sighting<Scalar>;
+  using Change = typename Any::VelocityChange;
+  using Device = Sonar<Scalar>;
+  using Integers = Array<std::int64_t>;
+  using Doubles = Array<double>;
+
+  static void bind(py::module_& m, const std::string& motion) {
+    py::class_<Any> filter(m, named<Scalar>("Slat_" + motion).c_str());
+    filter
+        .def_static("slatf",
+                    static_cast<Any (*)(const py::dict&, const py::dict&, const py::dict&,
+                                        const std::string&, int, int, const std::string&)>(&slatf),
+                    py::arg("motion"), py::arg("master"), py::arg("params"), py::arg("resampling"),
+                    py::arg("version"), py::arg("particles"), py::arg("lanes"))
+        .def_static("slatf_joint", &slatf_joint, py::arg("motion"), py::arg("master"),
+                    py::arg("params"), py::arg("resampling"), py::arg("particles"),
+                    py::arg("max_masters"))
+        .def_static(
+            "ekf_slat",
+            [](const py::dict& motion_params, const py::dict& master, const py::dict& params) {
+              const Motion slave = model<Motion>(motion_params);
+              return is_imm(master)
+                         ? ekf_slat<ImmEkf>(slave, imm(master), params)
+                         : ekf_slat<EkfSlatOf<Motion>>(slave, model<Master>(master), params);
+            },
+            py::arg("motion"), py::arg("master"), py::arg("params"))
+        .def_static(
+            "dead_reckoning",
+            [](const py::dict& motion_params) {
+              using Reckoning = DeadReckoning<Motion>;
+              return Any(
+                  pointer<GaussianSlatModel<Reckoning>>(Reckoning(model<Motion>(motion_params))));
+            },
+            py::arg("motion"))
+        .def("copy", [](const Any& f) { return Any(f); })
+        .def(
+            "reset",
+            [](Any& f, const Array<Scalar>& x, const Array<Scalar>& p, math::Random& random) {
+              require_ok(f.reset(belief<kPose>(x, p), random));
+            },
+            py::arg("x").noconvert(), py::arg("P").noconvert(), py::arg("random"))
+        .def(
+            "add_master",
+            [](Any& f, const Array<Scalar>& x, const Array<Scalar>& p) {
+              require_ok(f.add_master(belief<6>(x, p)));
+            },
+            py::arg("x").noconvert(), py::arg("P").noconvert())
+        .def("step", &step, py::arg("dt"), py::arg("u").noconvert(), py::arg("changes").noconvert(),
+             py::arg("z").noconvert(), py::arg("master").noconvert(), py::arg("sonar"),
+             py::arg("random"))
+        .def("particles", &particles)
+        .def("mode_probabilities", &Any::mode_probabilities, py::arg("n"))
+        .def("simulate", &simulate, py::arg("sonar"), py::arg("scenario"), py::arg("seed"),
+             py::arg("first_run"), py::arg("runs"))
+        .def_property_readonly("readings", &readings);
+    bind_steps(filter);
+
+    py::class_<Switch> outage(m, named<Scalar>("SlatOutage_" + motion).c_str());
+    outage.def(py::init([](const Any& f) { return Switch(f); }), py::arg("prototype"))
+        .def("copy", [](const Switch& f) { return Switch(f); })
+        .def("share", &share, py::arg("x").noconvert(), py::arg("P").noconvert(),
+             py::arg("masters_x").noconvert(), py::arg("masters_P").noconvert())
+        .def_property_readonly("filter", [](const Switch& f) { return Any(f.filter()); })
+        .def_property_readonly("communication", [](const Switch& f) {
+          const Communication mode = f.mode();
+          return mode == Communication::kUp     ? "up"
+                 : mode == Communication::kDown ? "down"
+                                                : "never";
+        });
+    bind_steps(outage);
+  }
+
+ private:
+  template <class Filter>
+  static void bind_steps(py::class_<Filter>& c) {
+    c.def(
+         "predict",
+         [](Filter& f, Scalar dt, const Array<Scalar>& u, const Array<Scalar>& changes,
+            math::Random& random) {
+           const Plan plan(changes);
+           require_ok(f.predict(dt, to_matrix<2, 1>(u, "u"), random, plan.pointer()));
+         },
+         py::arg("dt"), py::arg("u").noconvert(), py::arg("changes").noconvert(), py::arg("random"))
+        .def(
+            "update",
+            [](Filter& f, const Array<Scalar>& z, const Integers& master, const Device& sonar,
+               math::Random& random) {
+              const Echoes echoes(z, master);
+              require_ok(f.update(echoes.heard, echoes.count, sonar, random));
+            },
+            py::arg("z").noconvert(), py::arg("master").noconvert(), py::arg("sonar"),
+            py::arg("random"))
+        .def("run", &run<Filter>, py::arg("time_s").noconvert(), py::arg("u").noconvert(),
+             py::arg("changes").noconvert(), py::arg("echo_time_s").noconvert(),
+             py::arg("z").noconvert(), py::arg("master").noconvert(), py::arg("sonar"),
+             py::arg("random"))
+        .def("slave",
+             [](const Filter& f) {
+               const auto b = f.slave();
+               return py::make_tuple(to_array(b.x), to_array(b.P));
+             })
+        .def(
+            "master",
+            [](const Filter& f, int n) {
+              const auto b = f.master(n);
+              return py::make_tuple(to_array(b.x), to_array(b.P));
+            },
+            py::arg("n"));
+  }
+
+  template <class Model>
+  static Model model(const py::dict& params) {
+    const Model result(from_dict<typename Model::Params>(params));
+    require_ok(result.check());
+    return result;
+  }
+
+  template <class Model, class Filter>
+  static std::unique_ptr<typename Any::Interface> pointer(const Filter& filter) {
+    return std::unique_ptr<typename Any::Interface>(new Model(filter));
+  }
+
+  template <int N>
+  static Belief<Scalar, N> belief(const Array<Scalar>& x, const Array<Scalar>& p) {
+    Belief<Scalar, N> result;
+    result.x = to_matrix<N, 1>(x, "x");
+    result.P = to_matrix<N, N>(p, "P");
+    return result;
+  }
+
+  /// Velocity changes (masters, 2) with room for masters that are born; no rows: no plan.
+  struct Plan {
+    Change changes[Any::kMasters];
+    bool given;
+
+    explicit Plan(const Array<Scalar>& array) : given(array.ndim() > 0 && array.shape(0) > 0) {
+      require_shape(array, {-1, 2}, "changes");
+      if (array.shape(0) > Any::kMasters) throw py::value_error("changes has too many masters");
+      for (int n = 0; n < Any::kMasters; ++n) {
+        const bool planned = n < array.shape(0);
+        for (int i = 0; i < 2; ++i) changes[n](i) = planned ? array.data()[2 * n + i] : Scalar(0);
+      }
+    }
+    const Change* pointer() const { return given ? changes : nullptr; }
+  };
+
+  /// Echoes (count, 2) and the masters they belong to (count).
+  struct Echoes {
+    Echo heard[Any::kMasters];
+    int count;
+
+    Echoes(const Array<Scalar>& z, const Integers& master) : count(0) {
+      require_shape(z, {-1, 2}, "z");
+      require_shape(master, {z.shape(0)}, "master");
+      if (z.shape(0) > Any::kMasters) throw py::value_error("z has too many echoes");
+      for (; count < z.shape(0); ++count)
+        fill(heard[count], z.data() + 2 * count, master.data()[count]);
+    }
+    static void fill(Echo& echo, const Scalar* z, std::int64_t master) {
+      echo.z(0) = z[0];
+      echo.z(1) = z[1];
+      echo.master = static_cast<int>(master);
+    }
+  };
+
+  /// The hypotheses of the joint filter grow with the power of the masters.
+  using Models = ThreeModels<Scalar>;
+  using ImmEkf = EkfSlat<Motion, Models, kImmMasters>;
+
+  static bool is_imm(const py::dict& master) { return master.contains("switch_rate_hz"); }
+
+  static Models imm(const py::dict& master) {
+    typename Models::Params params;
+    params.switch_rate_hz = master["switch_rate_hz"].template cast<Scalar>();
+    const auto share = master["share"].template cast<std::vector<Scalar>>();
+    if (share.size() != Models::kModes) throw py::value_error("share must have 3 elements");
+    for (int k = 0; k < Models::kModes; ++k) params.share(k) = share[static_cast<std::size_t>(k)];
+    const Models result(
+        params, model<ConstantVelocity<Scalar>>(master["straight"].template cast<py::dict>()),
+        model<ExactAcceleration<Scalar>>(master["accelerated"].template cast<py::dict>()),
+        model<CoordinatedTurn<Scalar>>(master["turning"].template cast<py::dict>()));
+    require_ok(result.check());
+    return result;
+  }
+
+  template <class Ekf>
+  static Any ekf_slat(const Motion& motion, const typename Ekf::Master& master,
+                      const py::dict& values) {
+    typename EkfSlatOf<Motion>::Params given =
+        from_dict<typename EkfSlatOf<Motion>::Params>(values);
+    typename Ekf::Params params;
+    params.gate = given.gate;
+    return Any(std::unique_ptr<typename Any::Interface>(
+        new GaussianSlatModel<Ekf>(Ekf(motion, master, params))));
+  }
+
+  static Any slatf(const py::dict& motion, const py::dict& master, const py::dict& params,
+                   const std::string& resampling, int version, int particles,
+                   const std::string& lanes) {
+    if (!is_imm(master)) {
+      return slatf(motion, model<Master>(master), params, resampling, version, particles, lanes);
+    }
+    if (lanes != "scalar") throw py::value_error("lanes must be 'scalar' with an Imm");
+    return slatf(motion, imm(master), params, resampling, version, particles, lanes);
+  }
+
+  template <class Landmark>
+  static Any slatf(const py::dict& motion, const Landmark& master, const py::dict& params,
+                   const std::string& resampling, int version, int particles,
+                   const std::string& lanes) {
+    SlatfSetup<Motion, Landmark> setup;
+    setup.motion = model<Motion>(motion);
+    setup.master = master;
+    setup.params = from_dict<SlatfParams<Scalar>>(params);
+    setup.resampling = resampling_named(resampling);
+    setup.version = version;
+    setup.particles = particles;
+    if (version != 1 && version != 2) throw py::value_error("version must be 1 or 2");
+    if (particles < 1) throw py::value_error("particles must be positive");
+    const std::vector<std::string> sets = instruction_sets(std::is_same<Scalar, float>::value);
+    if (std::find(sets.begin(), sets.end(), lanes) == sets.end()) {
+      throw py::value_error("lanes must be one of slat_lanes()");
+    }
+#if AUVEST_VECTOR_LANES
+    if constexpr (std::is_same<Scalar, float>::value && std::is_same<Landmark, Master>::value) {
+      if (lanes == "sse2") return Any(make_slatf<InstructionSet::kSse2>(setup));
+      if (lanes == "avx2") return Any(make_slatf<InstructionSet::kAvx2>(setup));
+      if (lanes == "avx512") return Any(make_slatf<InstructionSet::kAvx512>(setup));
+    }
+#endif
+    return Any(make_slatf<InstructionSet::kScalar>(setup));
+  }
+
+  static Any slatf_joint(const py::dict& motion, const py::dict& master, const py::dict& params,
+                         const std::string& resampling, int particles, int max_masters) {
+    SlatfJointSetup<Motion> setup;
+    setup.motion = model<Motion>(motion);
+    setup.master = model<Master>(master);
+    setup.params = from_dict<SlatfJointParams<Scalar>>(params);
+    setup.resampling = resampling_named(resampling);
+    setup.particles = particles;
+    setup.max_masters = max_masters;
+    if (particles < 1) throw py::value_error("particles must be positive");
+    if (max_masters < 1 || max_masters > Any::kMasters) {
+      throw py::value_error("max_masters must be 1 to slat_max_masters");
+    }
+    return Any(make_slatf_joint(setup));
+  }
+
+  static void share(Switch& outage, const Array<Scalar>& x, const Array<Scalar>& p,
+                    const Array<Scalar>& masters_x, const Array<Scalar>& masters_p) {
+    require_shape(masters_x, {-1, 6}, "masters_x");
+    const py::ssize_t count = masters_x.shape(0);
+    require_shape(masters_p, {count, 6, 6}, "masters_P");
+    if (count > Any::kMasters) throw py::value_error("masters_x has too many masters");
+    typename Any::MasterBelief masters[Any::kMasters];
+    for (py::ssize_t n = 0; n < count; ++n) {
+      for (int i = 0; i < 6; ++i) {
+        masters[n].x(i) = masters_x.data()[n * 6 + i];
+        for (int j = 0; j < 6; ++j) masters[n].P(i, j) = masters_p.data()[(n * 6 + i) * 6 + j];
+      }
+    }
+    require_ok(outage.share(belief<kPose>(x, p), masters, static_cast<int>(count)));
+  }
+
+  static void step(Any& filter, Scalar dt, const Array<Scalar>& u, const Array<Scalar>& changes,
+                   const Array<Scalar>& z, const Integers& master, const Device& sonar,
+                   math::Random& random) {
+    const Plan plan(changes);
+    const Echoes echoes(z, master);
+    require_ok(filter.step(dt, to_matrix<2, 1>(u, "u"), plan.pointer(), echoes.heard, echoes.count,
+                           sonar, random));
+  }
+
+  static py::tuple particles(const Any& filter) {
+    const py::ssize_t n = filter.readings().particles;
+    py::array_t<Scalar> weights(n);
+    py::array_t<Scalar> poses({n, py::ssize_t(kPose)});
+    filter.particles(weights.mutable_data(), poses.mutable_data());
+    return py::make_tuple(weights, poses);
+  }
+
+  static py::dict readings(const Any& filter) {
+    const SlatReadings<Scalar> now = filter.readings();
+    py::dict result;
+    result["masters"] = now.masters;
+    result["particles"] = now.particles;
+    result["resamplings"] = now.resamplings;
+    result["effective_size"] = now.effective_size;
+    result["log_likelihood"] = now.log_likelihood;
+    result["nis"] = now.nis;
+    return result;
+  }
+
+  static SlatReadings<Scalar> readings_of(const Any& filter) { return filter.readings(); }
+  static SlatReadings<Scalar> readings_of(const Switch& outage) {
+    return outage.filter().readings();
+  }
+
+  /// A record of T readings: reading k, u[k], holds from time_s[k] to time_s[k + 1]. Echoes come in
+  /// the order of their times, all within the record; those of the same time are one update. Row k
+  /// of what is returned is the state of affairs at time_s[k + 1]. `changes` (T, masters, 2): the
+  /// planned velocity changes of each interval, of which an echo in between takes its share; T = 0:
+  /// no plan.
+  template <class Filter>
+  static py::dict run(Filter& filter, const Doubles& time_s, const Array<Scalar>& u,
+                      const Array<Scalar>& changes, const Doubles& echo_time_s,
+                      const Array<Scalar>& z, const Integers& master, const Device& sonar,
+                      math::Random& random) {
+    require_shape(u, {-1, 2}, "u");
+    const py::ssize_t rows = u.shape(0);
+    require_shape(time_s, {rows + 1}, "time_s");
+    require_shape(z, {-1, 2}, "z");
+    const py::ssize_t echoes = z.shape(0);
+    require_shape(echo_time_s, {echoes}, "echo_time_s");
+    require_shape(master, {echoes}, "master");
+    require_shape(changes, {-1, -1, 2}, "changes");
+    const bool planned = changes.shape(0) > 0;
+    const py::ssize_t plans = changes.shape(1);
+    if ((planned && changes.shape(0) != rows) || plans > Any::kMasters) {
+      throw py::value_error("changes has the wrong shape");
+    }
+
+    const py::ssize_t width = Any::kMasters;
+    py::array_t<Scalar> x({rows, py::ssize_t(kPose)});
+    py::array_t<Scalar> p({rows, py::ssize_t(kPose), py::ssize_t(kPose)});
+    py::array_t<Scalar> masters_x({rows, width, py::ssize_t(6)});
+    py::array_t<Scalar> masters_p({rows, width, py::ssize_t(6), py::ssize_t(6)});
+    py::array_t<std::int64_t> masters(rows);
+    py::array_t<Scalar> effective_size(rows);
+    py::array_t<std::int64_t> resamplings(rows);
+    py::array_t<Scalar> log_likelihood(rows);
+    py::array_t<Scalar> nis(rows);
+    Scalar* x_out = x.mutable_data();
+    Scalar* p_out = p.mutable_data();
+    Scalar* masters_x_out = masters_x.mutable_data();
+    Scalar* masters_p_out = masters_p.mutable_data();
+    std::int64_t* masters_out = masters.mutable_data();
+    Scalar* size_out = effective_size.mutable_data();
+    std::int64_t* resamplings_out = resamplings.mutable_data();
+    Scalar* likelihood_out = log_likelihood.mutable_data();
+    Scalar* nis_out = nis.mutable_data();
+    const double* time = time_s.data();
+    const double* heard_at = echo_time_s.data();
+
+    py::ssize_t done = 0;
+    py::ssize_t heard = 0;
+    Status status = Status::kOk;
+    {
+      py::gil_scoped_release release;
+      const Scalar nan = std::numeric_limits<Scalar>::quiet_NaN();
+      std::fill_n(masters_x_out, masters_x.size(), nan);
+      std::fill_n(masters_p_out, masters_p.size(), nan);
+      // Takes in the echoes of one time.
+      const auto listen = [&]() {
+        Echo group[Any::kMasters];
+        int count = 0;
+        const double now = heard_at[heard];
+        for (; heard < echoes && heard_at[heard] == now; ++heard, ++count) {
+          if (count == Any::kMasters) return Status::kBadParameter;
+          Echoes::fill(group[count], z.data() + 2 * heard, master.data()[heard]);
+        }
+        return filter.update(group, count, sonar, random);
+      };
+      for (; done < rows && status == Status::kOk; ++done) {
+        const double end = time[done + 1];
+        double now = time[done];
+        while (status == Status::kOk) {
+          if (heard < echoes && heard_at[heard] == now) status = listen();
+          if (status != Status::kOk || now == end) break;
+          const bool stop = heard < echoes && heard_at[heard] < end;
+          const double next = stop ? heard_at[heard] : end;
+          typename Any::Control reading;
+          for (int i = 0; i < 2; ++i) reading(i) = u.data()[2 * done + i];
+          Change plan[Any::kMasters];
+          const Scalar share = next - now == end - time[done]
+                                   ? Scalar(1)
+                                   : static_cast<Scalar>((next - now) / (end - time[done]));
+          for (int n = 0; n < Any::kMasters; ++n) {
+            for (int i = 0; i < 2; ++i) {
+              plan[n](i) = planned && n < plans ? share * changes.data()[(done * plans + n) * 2 + i]
+                                                : Scalar(0);
+            }
+          }
+          status = filter.predict(static_cast<Scalar>(next - now), reading, random,
+                                  planned ? plan : nullptr);
+          now = next;
+        }
+        if (status != Status::kOk) break;
+        const SlatReadings<Scalar> readings = readings_of(filter);
+        const auto slave = filter.slave();
+        copy_to(slave.x, x_out + done * kPose);
+        copy_to(slave.P, p_out + done * kPose * kPose);
+        for (int n = 0; n < readings.masters; ++n) {
+          const auto seen = filter.master(n);
+          copy_to(seen.x, masters_x_out + (done * width + n) * 6);
+          copy_to(seen.P, masters_p_out + (done * width + n) * 36);
+        }
+        masters_out[done] = readings.masters;
+        size_out[done] = readings.effective_size;
+        resamplings_out[done] = readings.resamplings;
+        likelihood_out[done] = readings.log_likelihood;
+        nis_out[done] = readings.nis;
+      }
+    }
+    py::dict result;
+    result["done"] = done;
+    result["heard"] = heard;
+    result["status"] = status;
+    result["x"] = x;
+    result["P"] = p;
+    result["masters"] = masters;
+    result["masters_x"] = masters_x;
+    result["masters_P"] = masters_p;
+    result["effective_size"] = effective_size;
+    result["resamplings"] = resamplings;
+    result["log_likelihood"] = log_likelihood;
+    result["nis"] = nis;
+    return result;
+  }
+
+  /// Runs first_run .. first_run + runs - 1 of the scenario. Run r takes streams 2 r (world) and
+  /// 2 r + 1 (filter) of the seed, so runs may be shared out to any number of threads, and every
+  /// filter meets the same noise. Rows are pings; those after a failure are NaN.
+  static py::dict simulate(const Any& prototype, const Device& sonar, const SlatScenario& scenario,
+                           std::uint64_t seed, std::uint64_t first_run, py::ssize_t runs) {
+    const py::ssize_t steps =
+        static_cast<py::ssize_t>(scenario.duration_s / scenario.odometry_s + 0.5);
+    const py::ssize_t pings = steps / scenario.odometry_per_ping;
+    const py::ssize_t count = scenario.count;
+    const std::vector<py::ssize_t> flat{runs, pings};
+    py::array_t<double> time(pings);
+    py::array_t<double> truth(std::vector<py::ssize_t>{pings, 2});
+    py::array_t<double> masters(std::vector<py::ssize_t>{pings, count, 2});
+    py::array_t<double> error(std::vector<py::ssize_t>{runs, pings, 2});
+    py::array_t<double> covariance(std::vector<py::ssize_t>{runs, pings, 2, 2});
+    py::array_t<double> master_error(std::vector<py::ssize_t>{runs, pings, count, 2});
+    py::array_t<double> size(flat), nis(flat);
+    py::array_t<std::int64_t> resamplings(runs), heard(runs);
+    py::array_t<double> log_likelihood(runs);
+    py::array_t<std::uint8_t> result_status(runs);
+    for (auto* array : {&time, &truth, &masters, &error, &covariance, &master_error, &size, &nis}) {
+      std::fill_n(array->mutable_data(), array->size(), std::numeric_limits<double>::quiet_NaN());
+    }
+    double* time_out = time.mutable_data();
+    double* truth_out = truth.mutable_data();
+    double* masters_out = masters.mutable_data();
+    double* error_out = error.mutable_data();
+    double* covariance_out = covariance.mutable_data();
+    double* master_error_out = master_error.mutable_data();
+    double* size_out = size.mutable_data();
+    double* nis_out = nis.mutable_data();
+    double* likelihood_out = log_likelihood.mutable_data();
+    std::int64_t* resamplings_out = resamplings.mutable_data();
+    std::int64_t* heard_out = heard.mutable_data();
+    std::uint8_t* status_out = result_status.mutable_data();
+    {
+      py::gil_scoped_release release;
+      for (py::ssize_t run = 0; run < runs; ++run) {
+        Any filter = prototype;
+        const std::uint64_t stream = 2 * (first_run + static_cast<std::uint64_t>(run));
+        math::Random world(seed, stream);
+        math::Random random(seed, stream + 1);
+        py::ssize_t ping = 0;
+        std::int64_t echoes = 0;
+        const Status status =
+            run_slat(filter, sonar, scenario, world, random, [&](const SlatStep<Any>& step) {
+              const py::ssize_t row = run * pings + ping;
+              const SlatReadings<Scalar> readings = step.filter.readings();
+              const auto slave = step.filter.slave();
+              for (int i = 0; i < 2; ++i) {
+                truth_out[ping * 2 + i] = step.slave.position[i];
+                error_out[row * 2 + i] = static_cast<double>(slave.x(i)) - step.slave.position[i];
+                for (int j = 0; j < 2; ++j) {
+                  covariance_out[row * 4 + i * 2 + j] = static_cast<double>(slave.P(i, j));
+                }
+              }
+              for (int n = 0; n < count; ++n) {
+                const py::ssize_t at = ping * count + n;
+                for (int i = 0; i < 2; ++i) masters_out[at * 2 + i] = step.masters[n].position[i];
+                if (n >= readings.masters) continue;
+                const auto master = step.filter.master(n);
+                for (int i = 0; i < 2; ++i) {
+                  master_error_out[(run * pings * count + at) * 2 + i] =
+                      static_cast<double>(master.x(i)) - step.masters[n].position[i];
+                }
+              }
+              time_out[ping] = step.time_s;
+              size_out[row] = static_cast<double>(readings.effective_size);
+              nis_out[row] = static_cast<double>(readings.nis);
+              echoes += step.heard;
+              ++ping;
+            });
+        const SlatReadings<Scalar> end = filter.readings();
+        resamplings_out[run] = end.resamplings;
+        likelihood_out[run] = static_cast<double>(end.log_likelihood);
+        heard_out[run] = echoes;
+        status_out[run] = static_cast<std::uint8_t>(status);
+      }
+    }
+    py::dict result;
+    result["time_s"] = time;
+    result["truth"] = truth;
+    result["masters"] = masters;
+    result["error"] = error;
+    result["covariance"] = covariance;
+    result["master_error"] = master_error;
+    result["effective_size"] = size;
+    result["nis"] = nis;
+    result["resamplings"] = resamplings;
+    result["heard"] = heard;
+    result["log_likelihood"] = log_likelihood;
+    result["status"] = result_status;
+    return result;
+  }
+};
+
+}  // namespace bindings
+}  // namespace auvest

@@ -1,0 +1,100 @@
+// The names under which Python sees the parameters of slat/ and of its scenario, as params.hpp.
+#pragma once
+
+#include "any_slat.hpp"
+#include "auvest/models/constant_velocity.hpp"
+#include "auvest/models/coordinated_turn.hpp"
+#include "auvest/models/piecewise_acceleration.hpp"
+#include "auvest/models/slave_motion.hpp"
+#include "auvest/models/sonar.hpp"
+#include "auvest/scenarios/slat.hpp"
+#include "auvest/slat/ekf_slat.hpp"
+#include "auvest/slat/slatf.hpp"
+#include "auvest/slat/slatf_joint.hpp"
+
+namespace auvest {
+
+// Params are nested in class templates, from which C++ cannot deduce: one overload per precision.
+#define AUVEST_VISIT(Type, ...)                    \
+  template <class Visitor>                         \
+  void visit(Type<float>::Params& p, Visitor v) {  \
+    __VA_ARGS__                                    \
+  }                                                \
+  template <class Visitor>                         \
+  void visit(Type<double>::Params& p, Visitor v) { \
+    __VA_ARGS__                                    \
+  }
+
+AUVEST_VISIT(CompassMotion, v("sigma_speed_mps", p.sigma_speed_mps);
+             v("sigma_heading_rad", p.sigma_heading_rad); v("compensate_bias", p.compensate_bias);)
+AUVEST_VISIT(UnicycleMotion, v("sigma_speed_mps", p.sigma_speed_mps);
+             v("sigma_yaw_rate_radps", p.sigma_yaw_rate_radps);)
+AUVEST_VISIT(PiecewiseAcceleration, v("acceleration_mps2", p.acceleration_mps2);)
+AUVEST_VISIT(ConstantVelocity, v("velocity_psd", p.velocity);
+             v("sigma_acceleration_mps2", p.sigma_acceleration_mps2);)
+AUVEST_VISIT(CoordinatedTurn, v("position_psd", p.noise.position);
+             v("velocity_psd", p.noise.velocity); v("acceleration_psd", p.noise.acceleration);
+             v("slow_mps", p.slow_mps);)
+AUVEST_VISIT(Sonar, v("sigma_range_m", p.sigma_range_m);
+             v("sigma_bearing_rad", p.sigma_bearing_rad);)
+
+template <class Motion>
+using EkfSlatOf = EkfSlat<Motion, PiecewiseAcceleration<typename Motion::Scalar>,
+                          AnySlat<typename Motion::Scalar, Motion::kStates>::kMasters>;
+template <class Scalar>
+using CompassEkfSlat = EkfSlatOf<CompassMotion<Scalar>>;
+template <class Scalar>
+using UnicycleEkfSlat = EkfSlatOf<UnicycleMotion<Scalar>>;
+AUVEST_VISIT(CompassEkfSlat, v("gate", p.gate);)
+AUVEST_VISIT(UnicycleEkfSlat, v("gate", p.gate);)
+
+#undef AUVEST_VISIT
+
+template <class Scalar, class Visitor>
+void visit(SlatfParams<Scalar>& p, Visitor v) {
+  v("resample_below", p.resample_below);
+  v("carry_covariance", p.carry_covariance);
+  v("gate", p.gate);
+  v("birth_velocity_mps", p.birth_velocity_mps);
+  v("birth_acceleration_mps2", p.birth_acceleration_mps2);
+}
+
+template <class Scalar, class Visitor>
+void visit(SlatfJointParams<Scalar>& p, Visitor v) {
+  v("resample_below", p.resample_below);
+  v("kept", p.kept);
+  v("gate", p.gate);
+}
+
+template <class Visitor>
+void visit(SlatVehicle& p, Visitor v) {
+  v("x_m", p.position[0]);
+  v("y_m", p.position[1]);
+  v("heading_rad", p.heading);
+  v("speed_mps", p.speed);
+  v("turn_start_s", p.turn_start_s);
+  v("turn_rate_radps", p.turn_rate);
+}
+
+template <class Visitor>
+void visit(SlatScenario& p, Visitor v) {
+  v("duration_s", p.duration_s);
+  v("odometry_s", p.odometry_s);
+  v("odometry_per_ping", p.odometry_per_ping);
+  v("sigma_speed_mps", p.sigma_speed_mps);
+  v("sigma_heading_rad", p.sigma_heading_rad);
+  v("sigma_range_m", p.sigma_range_m);
+  v("sigma_bearing_rad", p.sigma_bearing_rad);
+  v("dropout", p.dropout);
+  v("outlier", p.outlier);
+  v("outlier_sigmas", p.outlier_sigmas);
+  v("silent_from_s", p.silent_from_s);
+  v("silent_to_s", p.silent_to_s);
+  v("identified", p.identified);
+  v("plan_known", p.plan_known);
+  v("prior_position_m", p.prior_position_m);
+  v("prior_velocity_mps", p.prior_velocity_mps);
+  v("prior_acceleration_mps2", p.prior_acceleration_mps2);
+}
+
+}  // namespace auvest

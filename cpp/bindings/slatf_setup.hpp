@@ -1,0 +1,77 @@
+// What a SLATF or a SlatfJoint is made of at run time, and the instruction sets in whose lanes it
+// can run.
+#pragma once
+
+#include <memory>
+
+#include "any_resampling.hpp"
+#include "any_slat.hpp"
+#include "auvest/models/constant_velocity.hpp"
+#include "auvest/models/coordinated_turn.hpp"
+#include "auvest/models/piecewise_acceleration.hpp"
+#include "auvest/models/slave_motion.hpp"
+#include "auvest/slat/imm_slat.hpp"
+#include "auvest/slat/slatf.hpp"
+#include "auvest/slat/slatf_joint.hpp"
+
+// Particles stand in vector registers where xsimd is there to write it.
+#if defined(__x86_64__) && __has_include(<xsimd/xsimd.hpp>)
+#define AUVEST_VECTOR_LANES 1
+#else
+#define AUVEST_VECTOR_LANES 0
+#endif
+
+namespace auvest {
+namespace bindings {
+
+enum class InstructionSet : std::uint8_t { kScalar, kSse2, kAvx2, kAvx512 };
+
+/// Masters that EkfSlat with an Imm takes here: 3 to their power hypotheses.
+constexpr int kImmMasters = 2;
+
+/// The models of a master whose manoeuvres nobody announces.
+template <class Scalar>
+using ThreeModels =
+    Imm<ConstantVelocity<Scalar>, ExactAcceleration<Scalar>, CoordinatedTurn<Scalar>>;
+
+template <class Motion_, class Master_ = PiecewiseAcceleration<typename Motion_::Scalar>>
+struct SlatfSetup {
+  using Motion = Motion_;
+  using Master = Master_;
+  using Scalar = typename Motion::Scalar;
+
+  Motion motion;
+  Master master;
+  SlatfParams<Scalar> params;
+  AnyResampling resampling;
+  int version = 2;  ///< 1 or 2
+  int particles = 100;
+};
+
+template <class Motion_>
+struct SlatfJointSetup {
+  using Motion = Motion_;
+  using Scalar = typename Motion::Scalar;
+
+  Motion motion;
+  PiecewiseAcceleration<Scalar> master;
+  SlatfJointParams<Scalar> params;
+  AnyResampling resampling;
+  int particles = 100;
+  int max_masters = 1;  ///< 1, or up to AnySlat::kMasters: storage and time grow with the square
+};
+
+template <class Motion>
+using SlatfPointer =
+    std::unique_ptr<typename AnySlat<typename Motion::Scalar, Motion::kStates>::Interface>;
+
+/// Defined in slatf_lanes.hpp, and compiled in one file per instruction set.
+template <InstructionSet set, class Motion, class Master>
+SlatfPointer<Motion> make_slatf(const SlatfSetup<Motion, Master>& setup);
+
+/// Defined and compiled in slatf_joint.cpp.
+template <class Motion>
+SlatfPointer<Motion> make_slatf_joint(const SlatfJointSetup<Motion>& setup);
+
+}  // namespace bindings
+}  // namespace auvest
