@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import numbers
+import os
 import threading
 from collections.abc import Mapping
 from typing import Any, Literal, TypeAlias
@@ -136,6 +137,63 @@ def as_array(
     return array
 
 
+def as_covariance(name: str, value: npt.ArrayLike, states: int, dtype: DType) -> Floats:
+    """Take a symmetric (n, n) array with positive diagonal. The lower triangle is what counts."""
+    array = as_array(name, value, (states, states), dtype)
+    variances = np.diagonal(array).astype(np.float64)
+    if not (variances > 0).all():
+        i = int(np.argmin(variances))
+        raise ValueError(
+            f"{name}[{i}, {i}] is {variances[i]}; a variance must be positive in {dtype.name}"
+        )
+    given = np.asarray(value, dtype=np.float64)
+    sigma = np.sqrt(variances)
+    skew = np.abs(given - given.T) / np.outer(sigma, sigma)
+    if skew.max() > 1e-6:
+        i, j = (int(k) for k in np.unravel_index(np.argmax(skew), skew.shape))
+        raise ValueError(
+            f"{name} must be symmetric, but {name}[{i}, {j}] is {given[i, j]} "
+            f"and {name}[{j}, {i}] is {given[j, i]}"
+        )
+    return array
+
+
+def as_step(dt: object, dtype: DType) -> float:
+    """Take a time step, s, that this precision can hold."""
+    step = as_number("dt", dt, "not negative")
+    if step > float(np.finfo(dtype).max):
+        raise ValueError(f"dt = {step} is beyond the range of {dtype.name}")
+    return step
+
+
+def as_steps(dt: npt.ArrayLike, rows: int, dtype: DType) -> Floats:
+    """Take the times between rows, s: one for all or one each."""
+    if np.isscalar(dt) or (isinstance(dt, np.ndarray) and dt.ndim == 0):
+        return np.full(rows, as_step(dt, dtype), dtype)
+    steps = as_array("dt", dt, (None,), dtype)
+    if len(steps) != rows:
+        raise ValueError(f"dt has {len(steps)} rows and z has {rows}; they must have the same")
+    if (steps < 0).any():
+        k = int(np.argmax(steps < 0))
+        raise ValueError(f"dt[{k}] must not be negative, not {steps[k]}")
+    return steps
+
+
+def as_points(alpha: float, beta: float, kappa: float, states: int = 6) -> dict[str, float]:
+    """Take the parameters of the sigma points of a filter of so many states."""
+    alpha, beta = as_number("alpha", alpha), as_number("beta", beta)
+    kappa = as_number("kappa", kappa)
+    if not 1e-8 <= alpha <= 1:
+        raise ValueError(f"alpha must lie in 1e-8..1, not {alpha}")
+    if beta < alpha * alpha:
+        raise ValueError(f"beta must be at least alpha**2 = {alpha * alpha}, not {beta}")
+    if kappa <= -states:
+        raise ValueError(
+            f"kappa must be above {-states} (n + kappa > 0 with n = {states}), not {kappa}"
+        )
+    return {"alpha": alpha, "beta": beta, "kappa": kappa}
+
+
 def _refuse_element(
     name: str, raw: npt.NDArray[Any], index: tuple[int, ...], dtype: DType, missing: bool
 ) -> None:
@@ -195,6 +253,13 @@ def _check_shape(name: str, raw: npt.NDArray[Any], shape: tuple[int | None, ...]
 def _shape(shape: tuple[int | None, ...]) -> str:
     symbols = ["T" if extent is None else str(extent) for extent in shape]
     return f"({symbols[0]},)" if len(symbols) == 1 else f"({', '.join(symbols)})"
+
+
+def processors() -> int:
+    """Count the processors that this process may use, 256 at most."""
+    if hasattr(os, "sched_getaffinity"):
+        return min(256, len(os.sched_getaffinity(0)))
+    return min(256, os.cpu_count() or 1)
 
 
 class Exclusive:

@@ -18,10 +18,14 @@ from auvest._arguments import (
     Exclusive,
     Floats,
     as_array,
+    as_covariance,
     as_dtype,
     as_flag,
     as_instance,
     as_number,
+    as_points,
+    as_step,
+    as_steps,
     require_range,
 )
 from auvest._core import Status
@@ -104,7 +108,7 @@ class GaussianFilter:
     ) -> None:
         self._dtype = as_dtype(dtype)
         state = as_array("x0", x0, (6,), self._dtype)
-        covariance = _as_covariance("P0", P0, self._dtype)
+        covariance = as_covariance("P0", P0, 6, self._dtype)
         start = (
             state[:2].copy()
             if reference is None
@@ -395,7 +399,7 @@ class _TimedFilter(GaussianFilter):
         FilterError
             If the prediction cannot be done. In all cases the filter is unchanged.
         """
-        step = _as_step(dt, self._dtype)
+        step = as_step(dt, self._dtype)
         with self._exclusive:
             self._predict(step)
 
@@ -543,7 +547,7 @@ class Ukf(_UnscentedFilter, _TimedFilter):
             measurement=measurement,
             dtype=dtype,
             policy=_FIXED,
-            parameters=_as_points(alpha, beta, kappa),
+            parameters=as_points(alpha, beta, kappa),
         )
 
 
@@ -590,7 +594,7 @@ class Aukf(_UnscentedFilter):
             measurement=measurement,
             dtype=dtype,
             policy=as_instance("policy", policy, policies),
-            parameters=_as_points(alpha, beta, kappa),
+            parameters=as_points(alpha, beta, kappa),
             reference=reference,
         )
 
@@ -637,7 +641,7 @@ class Aukf(_UnscentedFilter):
         FilterError
             If the prediction cannot be done. In all cases the filter is unchanged.
         """
-        step = None if dt is None else _as_step(dt, self._dtype)
+        step = None if dt is None else as_step(dt, self._dtype)
         with self._exclusive:
             self._predict(self._filter.interval if step is None else step)
 
@@ -710,59 +714,9 @@ class Aukf(_UnscentedFilter):
         return self._run(z, dt, reference, measurement, covariance=covariance, adaptive=True)
 
 
-def _as_points(alpha: float, beta: float, kappa: float) -> dict[str, float]:
-    alpha, beta = as_number("alpha", alpha), as_number("beta", beta)
-    kappa = as_number("kappa", kappa)
-    if not 1e-8 <= alpha <= 1:
-        raise ValueError(f"alpha must lie in 1e-8..1, not {alpha}")
-    if beta < alpha * alpha:
-        raise ValueError(f"beta must be at least alpha**2 = {alpha * alpha}, not {beta}")
-    if kappa <= -6:
-        raise ValueError(f"kappa must be above -6 (n + kappa > 0 with n = 6), not {kappa}")
-    return {"alpha": alpha, "beta": beta, "kappa": kappa}
-
-
-def _as_covariance(name: str, value: npt.ArrayLike, dtype: DType) -> Floats:
-    """Take a symmetric (6, 6) array with positive diagonal. The lower triangle is what counts."""
-    array = as_array(name, value, (6, 6), dtype)
-    variances = np.diagonal(array).astype(np.float64)
-    if not (variances > 0).all():
-        i = int(np.argmin(variances))
-        raise ValueError(
-            f"{name}[{i}, {i}] is {variances[i]}; a variance must be positive in {dtype.name}"
-        )
-    given = np.asarray(value, dtype=np.float64)
-    sigma = np.sqrt(variances)
-    skew = np.abs(given - given.T) / np.outer(sigma, sigma)
-    if skew.max() > 1e-6:
-        i, j = (int(k) for k in np.unravel_index(np.argmax(skew), skew.shape))
-        raise ValueError(
-            f"{name} must be symmetric, but {name}[{i}, {j}] is {given[i, j]} "
-            f"and {name}[{j}, {i}] is {given[j, i]}"
-        )
-    return array
-
-
-def _as_step(dt: object, dtype: DType) -> float:
-    step = as_number("dt", dt, "not negative")
-    if step > float(np.finfo(dtype).max):
-        raise ValueError(f"dt = {step} is beyond the range of {dtype.name}")
-    return step
-
-
 def _as_steps(dt: npt.ArrayLike | None, rows: int, dtype: DType) -> Floats:
-    """Take times between rows; NaN stands for the interval that the filter chooses."""
-    if dt is None:
-        return np.full(rows, np.nan, dtype)
-    if np.isscalar(dt) or (isinstance(dt, np.ndarray) and dt.ndim == 0):
-        return np.full(rows, _as_step(dt, dtype), dtype)
-    steps = as_array("dt", dt, (None,), dtype)
-    if len(steps) != rows:
-        raise ValueError(f"dt has {len(steps)} rows and z has {rows}; they must have the same")
-    if (steps < 0).any():
-        k = int(np.argmax(steps < 0))
-        raise ValueError(f"dt[{k}] must not be negative, not {steps[k]}")
-    return steps
+    """Take times between rows; None stands for the intervals that the filter chooses."""
+    return np.full(rows, np.nan, dtype) if dt is None else as_steps(dt, rows, dtype)
 
 
 def _as_track(reference: npt.ArrayLike | None, rows: int, dtype: DType) -> Floats:

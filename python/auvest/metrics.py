@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -90,3 +91,90 @@ def chi2_bounds(dof: int, count: int = 1, level: float = 0.95) -> tuple[float, f
 
     low, high = stats.chi2.ppf([tail, 1 - tail], dof * count) / count
     return float(low), float(high)
+
+
+@dataclass(frozen=True)
+class Consistency:
+    """Whether means of NEES or NIS are what a consistent filter has.
+
+    Attributes
+    ----------
+    mean : float
+        Mean over what is independent: all NIS; for the NEES the runs at the last step.
+    low, high : float
+        Bounds of that mean for a consistent filter.
+    steps_inside : float
+        Share of the steps whose mean over the runs lies in the bounds for so many runs; about the
+        level for a consistent filter.
+    """
+
+    mean: float
+    low: float
+    high: float
+    steps_inside: float
+
+    @property
+    def consistent(self) -> bool:
+        """True if the mean lies in its bounds."""
+        return self.low <= self.mean <= self.high
+
+
+def nis_consistency(nis: npt.ArrayLike, dof: int, level: float = 0.95) -> Consistency:
+    """Judge a filter by its NIS, which is white for a consistent filter.
+
+    Parameters
+    ----------
+    nis : array_like, shape (runs, steps)
+        NaN where there is no measurement.
+    dof : int
+        Numbers in a measurement.
+    level : float
+        Probability of the bounds, in (0, 1).
+    """
+    values = _runs_and_steps("nis", nis)
+    known = values[np.isfinite(values)]
+    return _judge(values, known, dof, level)
+
+
+def nees_consistency(nees: npt.ArrayLike, dof: int, level: float = 0.95) -> Consistency:
+    """Judge a filter by its NEES over runs that start from draws of its belief.
+
+    Errors of one run are correlated over time, so only the last step counts for the mean.
+
+    Parameters
+    ----------
+    nees : array_like, shape (runs, steps)
+    dof : int
+        Components of the error.
+    level : float
+        Probability of the bounds, in (0, 1).
+    """
+    values = _runs_and_steps("nees", nees)
+    last = values[:, -1]
+    return _judge(values, last[np.isfinite(last)], dof, level)
+
+
+def _runs_and_steps(name: str, values: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    array = np.asarray(values, dtype=np.float64)
+    if array.ndim != 2:
+        raise ValueError(f"{name} has shape {array.shape}, expected (runs, steps)")
+    if not np.isfinite(array).any():
+        raise ValueError(f"{name} has no finite element")
+    return array
+
+
+def _judge(
+    values: npt.NDArray[np.float64], known: npt.NDArray[np.float64], dof: int, level: float
+) -> Consistency:
+    low, high = chi2_bounds(dof, max(1, known.size), level)
+    finite = np.isfinite(values)
+    counts = finite.sum(axis=0)
+    sums = np.where(finite, values, 0.0).sum(axis=0)
+    bounds = {count: chi2_bounds(dof, count, level) for count in set(counts.tolist()) - {0}}
+    inside = [
+        bounds[count][0] <= total / count <= bounds[count][1]
+        for count, total in zip(counts.tolist(), sums.tolist(), strict=True)
+        if count
+    ]
+    mean = float(known.mean()) if known.size else float("nan")
+    return Consistency(mean, low, high, float(np.mean(inside)))

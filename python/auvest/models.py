@@ -1,22 +1,29 @@
-"""Process and measurement models of the AUKF paper (Deng, Yin, Duan 2019)."""
+"""Process and measurement models.
+
+Those of the AUKF paper (Deng, Yin, Duan 2019); dead reckoning and ranges to leaders for the
+M-estimation EKF (Li, Du, Fan, Chen, Mao, Luo 2020).
+"""
 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from auvest import _core
-from auvest._arguments import as_array, as_kind, as_number, as_pair, require_range
+from auvest._arguments import Bound, as_array, as_flag, as_kind, as_number, as_pair, require_range
 
 if TYPE_CHECKING:
     from auvest._core import _Process, _Sensor
 
 _NOISE = _core.constant_acceleration_defaults()
 _SENSOR = _core.range_bearing_defaults()
+_SPEED_HEADING = _core.speed_heading_defaults()
+_ODOMETRY = _core.odometry_defaults()
+_LEADER = _core.leader_range_defaults()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,25 +120,170 @@ class RangeBearing:
         return z.reshape(2) if one else z
 
 
+@dataclass(frozen=True, kw_only=True)
+class SpeedHeading:
+    """Dead reckoning by speed and heading, Eqs. (1) to (3), state ``[x, y]`` (m) and options.
+
+    What drives a prediction is ``[forward speed, starboard speed, heading]`` (m/s, m/s, rad). x is
+    north, y east and the heading clockwise from north; or x east, y north, the heading from east
+    anticlockwise and the second speed to port.
+
+    Parameters
+    ----------
+    sigma_forward, sigma_starboard : float
+        Noise of the two speeds, m/s/sqrt(Hz), not negative.
+    sigma_heading : float
+        Noise of the heading, rad/sqrt(Hz), not negative.
+    heading_bias : bool
+        Estimate the error of the compass (rad), the state after the position.
+    speed_scale : bool
+        Estimate the relative error of the speed, the last state.
+    bias_walk, scale_walk : float
+        Random walks of these two, rad/sqrt(s) and 1/sqrt(s), not negative.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If an argument lies outside its range.
+    """
+
+    sigma_forward: float = _SPEED_HEADING["sigma_forward"]
+    sigma_starboard: float = _SPEED_HEADING["sigma_starboard"]
+    sigma_heading: float = _SPEED_HEADING["sigma_heading"]
+    heading_bias: bool = False
+    speed_scale: bool = False
+    bias_walk: float = _SPEED_HEADING["bias_walk"]
+    scale_walk: float = _SPEED_HEADING["scale_walk"]
+
+    def __post_init__(self) -> None:
+        names = ("sigma_forward", "sigma_starboard", "sigma_heading", "bias_walk", "scale_walk")
+        _set_numbers(self, "not negative", *names)
+        for name in ("heading_bias", "speed_scale"):
+            object.__setattr__(self, name, as_flag(name, getattr(self, name)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Odometry:
+    """Dead reckoning by increments, state ``[x, y, theta]`` (m, m, rad); theta is not wrapped.
+
+    What drives a prediction is the motion since the last one in the frame of the pose then,
+    ``[forward, sideways, turn]`` (m, m, rad): sideways is to the left where angles run from +x
+    anticlockwise, to starboard where they run clockwise from north.
+
+    Parameters
+    ----------
+    sigma_distance : float
+        Noise of the position relative to the distance of an increment, not negative.
+    sigma_drift : float
+        Noise of the position that goes with time, m/sqrt(s), not negative.
+    sigma_turn : float
+        Noise of the heading, rad/sqrt(s), not negative.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If an argument lies outside its range.
+    """
+
+    sigma_distance: float = _ODOMETRY["sigma_distance"]
+    sigma_drift: float = _ODOMETRY["sigma_drift"]
+    sigma_turn: float = _ODOMETRY["sigma_turn"]
+
+    def __post_init__(self) -> None:
+        _set_numbers(self, "not negative", "sigma_distance", "sigma_drift", "sigma_turn")
+
+
+@dataclass(frozen=True, kw_only=True)
+class LeaderRange:
+    """Range (m) to a leader of known position, Eqs. (4) and (5); one per message, any leader.
+
+    Parameters
+    ----------
+    leader : (float, float)
+        Where the leader was when the range was taken, m.
+    sigma_range_m : float
+        Standard deviation of the range, positive.
+    sigma_leader_m : float
+        Standard deviation of the leader's position per axis, not negative; adds to the noise of the
+        range: ``R = sigma_range_m**2 + sigma_leader_m**2``.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If an argument lies outside its range.
+    """
+
+    leader: tuple[float, float] = (_LEADER["leader_x_m"], _LEADER["leader_y_m"])
+    sigma_range_m: float = _LEADER["sigma_range_m"]
+    sigma_leader_m: float = _LEADER["sigma_leader_m"]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "leader", as_pair("leader", self.leader))
+        _set_numbers(self, "positive", "sigma_range_m")
+        _set_numbers(self, "not negative", "sigma_leader_m")
+
+    def h(self, position: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Ranges (K,) without noise of positions (K, 2), m."""
+        rows = as_array("position", position, (None, 2), np.dtype(np.float64))
+        z: npt.NDArray[np.float64] = core_sensor(self, "float64").h(rows)
+        return z
+
+
+ProcessModel: TypeAlias = ConstantAcceleration | SpeedHeading | Odometry
+MeasurementModel: TypeAlias = RangeBearing | LeaderRange
+
+
+def process_name(model: ProcessModel) -> str:
+    """Give the name of the core's class for this model, without the precision."""
+    if isinstance(model, ConstantAcceleration):
+        return "EulerAcceleration" if model.discretisation == "euler" else "ExactAcceleration"
+    if isinstance(model, Odometry):
+        return "Odometry"
+    bias = "Bias" if model.heading_bias else ""
+    return f"SpeedHeading{bias}{'Scale' if model.speed_scale else ''}"
+
+
+def state_count(model: ProcessModel) -> int:
+    """Count the states."""
+    if isinstance(model, ConstantAcceleration):
+        return 6
+    if isinstance(model, Odometry):
+        return 3
+    return 2 + model.heading_bias + model.speed_scale
+
+
+def input_count(model: ProcessModel) -> int:
+    """Count the numbers that drive a prediction; 0: none."""
+    return 0 if isinstance(model, ConstantAcceleration) else 3
+
+
+def _set_numbers(model: Any, bound: Bound, *names: str) -> None:
+    for name in names:
+        object.__setattr__(model, name, as_number(name, getattr(model, name), bound))
+
+
 def _as_time(dt: float) -> float:
     return as_number("dt", dt, "not negative")
 
 
 @lru_cache(maxsize=64)
-def core_process(model: ConstantAcceleration, dtype: str) -> _Process[Any]:
+def core_process(model: ProcessModel, dtype: str) -> _Process[Any]:
     """Build the core's process model in this precision."""
     params = asdict(model)
-    stem = "EulerAcceleration" if params.pop("discretisation") == "euler" else "ExactAcceleration"
+    for structural in ("discretisation", "heading_bias", "speed_scale"):
+        params.pop(structural, None)
     require_range(params, dtype)
-    process: _Process[Any] = getattr(_core, f"{stem}_{dtype}")(params)
+    process: _Process[Any] = getattr(_core, f"{process_name(model)}_{dtype}")(params)
     return process
 
 
 @lru_cache(maxsize=256)
-def core_sensor(model: RangeBearing, dtype: str) -> _Sensor[Any]:
+def core_sensor(model: MeasurementModel, dtype: str) -> _Sensor[Any]:
     """Build the core's measurement model in this precision."""
     params = asdict(model)
-    params["station_x_m"], params["station_y_m"] = params.pop("station")
-    require_range(params, dtype, squared=("sigma_range_m", "sigma_bearing_rad"))
-    sensor: _Sensor[Any] = getattr(_core, f"RangeBearing_{dtype}")(params)
+    place = "station" if isinstance(model, RangeBearing) else "leader"
+    params[f"{place}_x_m"], params[f"{place}_y_m"] = params.pop(place)
+    squared = tuple(name for name in params if name.startswith("sigma_"))
+    require_range(params, dtype, squared=squared)
+    sensor: _Sensor[Any] = getattr(_core, f"{type(model).__name__}_{dtype}")(params)
     return sensor

@@ -6,7 +6,6 @@ when the next sample is taken, and the desired track is the true one, as in the 
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field
@@ -17,7 +16,15 @@ import numpy as np
 import numpy.typing as npt
 
 from auvest import _core, metrics
-from auvest._arguments import as_flag, as_instance, as_integer, as_kind, as_number, as_pair
+from auvest._arguments import (
+    as_flag,
+    as_instance,
+    as_integer,
+    as_kind,
+    as_number,
+    as_pair,
+    processors,
+)
 from auvest._core import Status
 from auvest.filters import Aukf, Ekf, Ukf
 from auvest.intervals import FixedInterval
@@ -334,7 +341,7 @@ def simulate(
     """
     as_instance("filter", filter, (Ekf, Ukf, Aukf))
     as_instance("scenario", scenario, Scenario)
-    threads = _processors() if workers is None else as_integer("workers", workers, 1, 256)
+    threads = processors() if workers is None else as_integer("workers", workers, 1, 256)
     if progress is not None and not callable(progress):
         raise TypeError(f"progress must be callable, not {type(progress).__name__}")
 
@@ -391,9 +398,3 @@ def _as_core(scenario: Scenario, first: int, count: int) -> _ScenarioDict:
         "probe_period_s": scenario.probe_period_s,
         "budget_m": scenario.budget_m,
     }
-
-
-def _processors() -> int:
-    if hasattr(os, "sched_getaffinity"):
-        return min(256, len(os.sched_getaffinity(0)))
-    return min(256, os.cpu_count() or 1)

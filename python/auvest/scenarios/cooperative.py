@@ -1,0 +1,364 @@
+"""A slave vehicle dead-reckons and ranges to two leaders in turn: the M-estimation EKF's setting.
+
+Li, Du, Fan, Chen, Mao, Luo 2020. The paper gives neither tracks nor noise; the tracks are those of
+this project's own reference case. The loop is C++
+(``cpp/include/auvest/scenarios/cooperative.hpp``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from auvest import _core, metrics
+from auvest._arguments import (
+    as_flag,
+    as_instance,
+    as_integer,
+    as_kind,
+    as_number,
+    as_pair,
+    processors,
+)
+from auvest._core import Status
+from auvest.kernels import Kernel, KernelName, RejectionStreak
+from auvest.models import LeaderRange, SpeedHeading, core_sensor
+from auvest.robust_filters import RobustEkf, RobustUkf
+
+_DEFAULTS = _core.cooperative_defaults()
+_STREAK = RejectionStreak()
+
+#: Rows (runs times steps) of one simulation at most: 64 bytes each.
+MAX_SAMPLES = 20_000_000
+
+#: 2.3 h of the paper's experiment, in steps of 1 s.
+PAPER_STEPS = 8280
+
+NoiseKind: TypeAlias = Literal["contaminated", "multipath", "student"]
+Timing: TypeAlias = Literal["at-once", "own-time", "as-if-fresh"]
+NOISE_KINDS: tuple[NoiseKind, ...] = ("contaminated", "multipath", "student")
+TIMINGS: tuple[Timing, ...] = ("at-once", "own-time", "as-if-fresh")
+
+
+def _as_probability(model: object, name: str) -> float:
+    value = as_number(name, getattr(model, name), "not negative")
+    if value > 1:
+        raise ValueError(f"{name} must lie in 0..1, not {value}")
+    return value
+
+
+@dataclass(frozen=True, kw_only=True)
+class RangeNoise:
+    """Errors of the ranges.
+
+    Parameters
+    ----------
+    kind : {"contaminated", "multipath", "student"}
+        "contaminated": normal, and with a probability of another, larger size. "multipath": normal,
+        and with that probability too long by the size of a second normal deviate. "student":
+        Student's t times ``sigma_m``.
+    sigma_m : float
+        Standard deviation (scale for "student"), m, positive.
+    outlier_fraction : float
+        Probability of an outlier, in 0..1; not for "student".
+    outlier_sigma_m : float
+        Size of an outlier, m, positive; not for "student".
+    degrees_of_freedom : int
+        Of Student's t, 1..100.
+    """
+
+    kind: NoiseKind = "contaminated"
+    sigma_m: float = _DEFAULTS["sigma_m"]
+    outlier_fraction: float = _DEFAULTS["outlier_fraction"]
+    outlier_sigma_m: float = _DEFAULTS["outlier_sigma_m"]
+    degrees_of_freedom: int = _DEFAULTS["degrees_of_freedom"]
+
+    def __post_init__(self) -> None:
+        as_kind("kind", self.kind, NOISE_KINDS)
+        set_field = object.__setattr__
+        for name in ("sigma_m", "outlier_sigma_m"):
+            set_field(self, name, as_number(name, getattr(self, name), "positive"))
+        set_field(self, "outlier_fraction", _as_probability(self, "outlier_fraction"))
+        dof = as_integer("degrees_of_freedom", self.degrees_of_freedom, 1, 100)
+        set_field(self, "degrees_of_freedom", dof)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scenario:
+    """What is simulated beside the filter.
+
+    Parameters
+    ----------
+    noise : RangeNoise
+        Errors of the ranges.
+    timing : {"at-once", "own-time", "as-if-fresh"}
+        "at-once": a range is there when it is measured. The other two: it comes with the leader's
+        next message, one cycle later; it is then taken at its own time with the leader's position
+        of that time, or as if it were fresh, with the position in the message.
+    dropout, late : float
+        Probabilities, in 0..1, that a message is lost or late.
+    late_steps : int
+        A late message is late by at most so many steps.
+    sigma_speed, sigma_heading : float
+        True noise of the slave's instruments, m/s/sqrt(Hz) and rad/sqrt(Hz), not negative.
+    range_every : int
+        Steps between ranges; the leaders take turns. Up to 10, so that a range is within the
+        filter's memory.
+    steps : int
+        Steps of 1 s of each run; 8280 is the paper's 2.3 h.
+    runs : int
+        Monte Carlo runs.
+    seed : int
+        Run r draws from stream r of this seed, whatever the number of workers.
+    random_start : bool
+        Draw the start from the filter's belief; else start at its mean.
+    offset_m : (float, float)
+        Error of the start that the filter does not know of, m.
+    """
+
+    noise: RangeNoise = field(default_factory=RangeNoise)
+    timing: Timing = "at-once"
+    dropout: float = 0.0
+    late: float = 0.0
+    late_steps: int = _DEFAULTS["late_steps"]
+    sigma_speed: float = _DEFAULTS["sigma_speed"]
+    sigma_heading: float = _DEFAULTS["sigma_heading"]
+    range_every: int = _DEFAULTS["range_every"]
+    steps: int = PAPER_STEPS
+    runs: int = 50
+    seed: int = 1
+    random_start: bool = False
+    offset_m: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        as_instance("noise", self.noise, RangeNoise)
+        as_kind("timing", self.timing, TIMINGS)
+        as_flag("random_start", self.random_start)
+        set_field = object.__setattr__
+        for name in ("dropout", "late"):
+            set_field(self, name, _as_probability(self, name))
+        for name in ("sigma_speed", "sigma_heading"):
+            set_field(self, name, as_number(name, getattr(self, name), "not negative"))
+        limits = {
+            "late_steps": (1, _DEFAULTS["most_late_steps"]),
+            "range_every": (1, 10),
+            "steps": (1, MAX_SAMPLES),
+            "runs": (1, MAX_SAMPLES),
+            "seed": (0, 2**64 - 1),
+        }
+        for name, (low, high) in limits.items():
+            set_field(self, name, as_integer(name, getattr(self, name), low, high))
+        if self.runs * self.steps > MAX_SAMPLES:
+            raise ValueError(
+                f"runs * steps must be at most {MAX_SAMPLES}, not {self.runs} * {self.steps}"
+            )
+        set_field(self, "offset_m", as_pair("offset_m", self.offset_m))
+
+
+@dataclass(frozen=True)
+class Result:
+    """What :func:`simulate` returns. Rows after the end of a run are NaN.
+
+    Attributes
+    ----------
+    error : ndarray, shape (runs, steps, 2)
+        Position errors, m.
+    covariance : ndarray, shape (runs, steps, 2, 2)
+        What the filter thinks of them, m^2.
+    nis : ndarray, shape (runs, steps)
+        Normalised innovation squared of a range that was taken at this step, else NaN.
+    weight : ndarray, shape (runs, steps)
+        The weight it got, else NaN.
+    samples : ndarray of int, shape (runs,)
+        Steps done.
+    recoveries : ndarray of int, shape (runs,)
+        Times that the recovery widened the covariance.
+    too_late : ndarray of int, shape (runs,)
+        Steps at which a range was older than the filter's memory.
+    status : ndarray of uint8, shape (runs,)
+        How each run ended: values of :class:`auvest.Status`, 0 is ok.
+    scenario : Scenario
+        What was simulated.
+    """
+
+    error: npt.NDArray[np.float64]
+    covariance: npt.NDArray[np.float64]
+    nis: npt.NDArray[np.float64]
+    weight: npt.NDArray[np.float64]
+    samples: npt.NDArray[np.int64]
+    recoveries: npt.NDArray[np.int64]
+    too_late: npt.NDArray[np.int64]
+    status: npt.NDArray[np.uint8]
+    scenario: Scenario
+
+    @property
+    def failed(self) -> npt.NDArray[np.bool_]:
+        """Runs whose status is not ok, shape (runs,)."""
+        failed: npt.NDArray[np.bool_] = self.status != int(Status.ok)
+        return failed
+
+    @property
+    def rmse_per_run_m(self) -> npt.NDArray[np.float64]:
+        """Root mean square position error of each run, m, shape (runs,)."""
+        square = np.square(self.error).sum(axis=-1)
+        return np.array([np.sqrt(row[~np.isnan(row)].mean()) for row in square])
+
+    @property
+    def rmse_m(self) -> float:
+        """Root mean square position error over all runs, m."""
+        return metrics.rmse(self.error)
+
+    @property
+    def rmse_standard_error_m(self) -> float:
+        """Standard error of ``rmse_m``, m; NaN for one run."""
+        square = np.square(self.rmse_per_run_m)
+        if len(square) < 2:
+            return float("nan")
+        return float(square.std(ddof=1) / np.sqrt(len(square)) / (2 * self.rmse_m))
+
+    @property
+    def nees(self) -> npt.NDArray[np.float64]:
+        """Normalised position error squared, shape (runs, steps); 2 degrees of freedom."""
+        return metrics.nees(self.error, self.covariance)
+
+
+def tracks(steps: int = PAPER_STEPS) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Give the true positions (m) at 1, 2, ... s: slave (steps, 2), leaders (steps, 2, 2)."""
+    slave, leaders = _core.cooperative_fleet(
+        _DEFAULTS["dt_s"], as_integer("steps", steps, 1, MAX_SAMPLES)
+    )
+    return slave, leaders
+
+
+def slave_filter(
+    kernel: Kernel | KernelName = "igg",
+    *,
+    kind: Literal["ekf", "ukf"] = "ekf",
+    q_factor: float = 1.0,
+    r_factor: float = 1.0,
+    sigma_range_m: float = _DEFAULTS["sigma_m"],
+    recovery: RejectionStreak | None = _STREAK,
+    residual: Literal["innovation", "post-fit"] = "innovation",
+    dtype: npt.DTypeLike = "float64",
+) -> RobustEkf | RobustUkf:
+    """Make the slave's filter: it starts at the true position with P0 = 1 m^2.
+
+    Parameters
+    ----------
+    kernel : Kernel or its name
+        "unit" makes it the plain EKF or UKF.
+    kind : {"ekf", "ukf"}
+    q_factor, r_factor : float
+        What the filter takes the noise of process and range for, in variance, relative to the
+        default scenario's; positive.
+    sigma_range_m : float
+        Standard deviation of the range that is multiplied, m.
+    recovery, residual, dtype
+        As for :class:`auvest.RobustEkf`.
+    """
+    q = as_number("q_factor", q_factor, "positive") ** 0.5
+    r = as_number("r_factor", r_factor, "positive") ** 0.5
+    as_kind("kind", kind, ("ekf", "ukf"))
+    make: type[RobustEkf] | type[RobustUkf] = RobustEkf if kind == "ekf" else RobustUkf
+    return make(
+        np.zeros(2),
+        np.eye(2),
+        process=SpeedHeading(
+            sigma_forward=q * _DEFAULTS["sigma_speed"], sigma_heading=q * _DEFAULTS["sigma_heading"]
+        ),
+        measurement=LeaderRange(sigma_range_m=r * sigma_range_m),
+        kernel=kernel,
+        recovery=recovery,
+        residual=residual,
+        dtype=dtype,
+    )
+
+
+_SCENARIO = Scenario()
+
+
+def simulate(
+    filter: RobustEkf | RobustUkf,  # noqa: A002 (its name in this package)
+    scenario: Scenario = _SCENARIO,
+    *,
+    workers: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Result:
+    """Run a filter through a scenario, many times.
+
+    Parameters
+    ----------
+    filter : RobustEkf or RobustUkf
+        The prototype, with :class:`auvest.SpeedHeading` of two states and a
+        :class:`auvest.LeaderRange`: its models, kernel and belief are the start of every run. It is
+        not changed. Its noise need not be the true noise.
+    scenario : Scenario
+    workers : int, optional
+        Threads, 1 to 256; default: one per processor. The result does not depend on it.
+    progress : callable, optional
+        Called as ``progress(runs_done, runs)`` in the calling thread. What it raises ends the
+        simulation; a ``KeyboardInterrupt`` carries the runs done so far as ``partial``.
+
+    Returns
+    -------
+    Result
+
+    Raises
+    ------
+    ValueError, TypeError
+        If an argument is wrong.
+    """
+    as_instance("filter", filter, (RobustEkf, RobustUkf))
+    as_instance("scenario", scenario, Scenario)
+    if not isinstance(filter.process, SpeedHeading) or len(filter.x) != 2:
+        raise ValueError(f"filter must have a SpeedHeading of two states, not {filter.process}")
+    if not isinstance(filter.measurement, LeaderRange):
+        raise ValueError(f"filter must measure a LeaderRange, not {filter.measurement}")
+    threads = processors() if workers is None else as_integer("workers", workers, 1, 256)
+    if progress is not None and not callable(progress):
+        raise TypeError(f"progress must be callable, not {type(progress).__name__}")
+    core = filter._prototype()
+    sensor = core_sensor(filter.measurement, filter.dtype.name)
+    runs = scenario.runs
+    chunk = max(1, min(-(-runs // (4 * threads)), 500_000 // scenario.steps))
+
+    def part(first: int) -> dict[str, npt.NDArray[Any]]:
+        count = min(chunk, runs - first)
+        return _core.cooperate(core, sensor, _as_core(scenario, first, count))
+
+    parts: dict[int, dict[str, npt.NDArray[Any]]] = {}
+    done = 0
+    with ThreadPoolExecutor(threads) as pool:
+        futures = {pool.submit(part, first): first for first in range(0, runs, chunk)}
+        try:
+            for future in as_completed(futures):
+                result = future.result()
+                parts[futures[future]] = result
+                done += len(result["samples"])
+                if progress is not None:
+                    progress(done, runs)
+        except BaseException as stop:
+            pool.shutdown(cancel_futures=True)
+            if isinstance(stop, KeyboardInterrupt) and parts:
+                stop.partial = _join(parts, scenario)  # type: ignore[attr-defined]
+            raise
+    return _join(parts, scenario)
+
+
+def _join(parts: dict[int, dict[str, npt.NDArray[Any]]], scenario: Scenario) -> Result:
+    ordered = [parts[first] for first in sorted(parts)]
+    arrays = {name: np.concatenate([p[name] for p in ordered]) for name in ordered[0]}
+    return Result(**arrays, scenario=scenario)
+
+
+def _as_core(scenario: Scenario, first: int, count: int) -> dict[str, Any]:
+    values = asdict(scenario)
+    values.update(values.pop("noise"))
+    x, y = values.pop("offset_m")
+    values.update(dt_s=_DEFAULTS["dt_s"], offset_x_m=x, offset_y_m=y, first_run=first, runs=count)
+    return values
