@@ -1,0 +1,227 @@
+"""Monte Carlo on all cores: reproducible, resumable, with tidy results.
+
+:func:`run` shares the runs of a task out to threads in chunks of fixed size. The result depends on
+the task alone: not on the number of workers, nor on whether it was made at one go. With a ``store``
+every finished chunk is a file; after a crash or an interruption the same call goes on where it
+stood.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import zipfile
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from auvest._arguments import as_integer
+
+Columns: TypeAlias = dict[str, npt.NDArray[Any]]
+#: ``task(first, count)`` does the runs ``first .. first + count - 1``, without the GIL if it can.
+#: All arrays have one row per run, or all the same number of rows.
+Task: TypeAlias = Callable[[int, int], Mapping[str, npt.NDArray[Any]]]
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C during :func:`run`.
+
+    Attributes
+    ----------
+    partial : dict of ndarray, or None
+        The columns of the chunks that are done, in the order of the runs; None: there are none.
+        Functions that simulate by :func:`run` put what they return in its place.
+    """
+
+    def __init__(self, partial: Any) -> None:
+        super().__init__()
+        self.partial = partial
+
+
+def processors() -> int:
+    """Processors that this process may use, at most 256."""
+    if hasattr(os, "sched_getaffinity"):
+        return min(256, len(os.sched_getaffinity(0)))
+    return min(256, os.cpu_count() or 1)
+
+
+def run(
+    task: Task,
+    runs: int,
+    *,
+    chunk: int = 10,
+    workers: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+    store: Path | None = None,
+    settings: Mapping[str, Any] | None = None,
+) -> Columns:
+    """Do all runs of a task.
+
+    Parameters
+    ----------
+    task : callable
+        ``task(first, count)`` returns a dict of arrays with the same number of rows. Run r must
+        depend on r alone; its random numbers come from stream r of a seed.
+    runs : int
+        Number of runs, positive.
+    chunk : int
+        Runs per call of the task, positive.
+    workers : int, optional
+        Threads, 1 to 256; default: one per processor.
+    progress : callable, optional
+        Called as ``progress(runs_done, runs)`` in the calling thread.
+    store : Path, optional
+        Folder for the finished chunks; made if missing. What is there from a call with the same
+        ``settings`` and ``chunk`` is taken over; anything else there is of another experiment and
+        removed. Delete it with :func:`discard` when the results are safe.
+    settings : mapping, optional
+        What the results depend on, for JSON. Must be given with ``store``.
+
+    Returns
+    -------
+    dict of ndarray
+        The task's arrays, joined in the order of the runs.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If an argument is wrong.
+    Interrupted
+        After Ctrl-C; the chunks that are done are kept.
+    """
+    total = as_integer("runs", runs, 1, 2**53)
+    size = as_integer("chunk", chunk, 1, 2**53)
+    threads = processors() if workers is None else as_integer("workers", workers, 1, 256)
+    if progress is not None and not callable(progress):
+        raise TypeError(f"progress must be callable, not {type(progress).__name__}")
+    if store is not None and settings is None:
+        raise TypeError("settings must be given with a store: they say whose results it holds")
+
+    kept = None if store is None else _Store(store, {"chunk": size, "settings": settings})
+    parts: dict[int, Columns] = {}
+    done = 0
+
+    def finish(first: int, columns: Columns) -> None:
+        nonlocal done
+        parts[first] = columns
+        done += min(size, total - first)
+        if progress is not None:
+            progress(done, total)
+
+    def work(first: int) -> Columns:
+        columns = _checked(task(first, min(size, total - first)))
+        if kept is not None:
+            kept.write(first, min(size, total - first), columns)
+        return columns
+
+    with ThreadPoolExecutor(threads) as pool:
+        try:
+            todo = []
+            for first in range(0, total, size):
+                old = None if kept is None else kept.read(first, min(size, total - first))
+                if old is None:
+                    todo.append(first)
+                else:
+                    finish(first, old)
+            futures = {pool.submit(work, first): first for first in todo}
+            for future in as_completed(futures):
+                finish(futures[future], future.result())
+        except BaseException as stop:
+            pool.shutdown(cancel_futures=True)
+            if isinstance(stop, KeyboardInterrupt):
+                raise Interrupted(_join(parts) if parts else None) from None
+            raise
+    return _join(parts)
+
+
+def discard(store: Path) -> None:
+    """Remove the chunks that :func:`run` keeps in this folder."""
+    shutil.rmtree(store, ignore_errors=True)
+
+
+def write_table(path: Path, columns: Mapping[str, npt.NDArray[Any]]) -> Path:
+    """Write the one-dimensional columns as a tidy table, one row per run.
+
+    Parameters
+    ----------
+    path : Path
+        Ends in ``.csv`` (all digits, NaN as nothing) or ``.parquet``. It is replaced as a whole, so
+        it is never half written.
+    columns : mapping of str to ndarray
+        Those of more than one dimension are left out.
+
+    Raises
+    ------
+    ValueError
+        If the path ends otherwise.
+    """
+    tidy = {name: values for name, values in columns.items() if values.ndim == 1}
+    new = path.with_name(path.name + ".new")
+    if path.suffix == ".csv":
+        with new.open("w", encoding="utf-8", newline="") as file:
+            file.write(",".join(tidy) + "\n")
+            for row in zip(*(values.tolist() for values in tidy.values()), strict=True):
+                file.write(",".join("" if cell != cell else str(cell) for cell in row) + "\n")
+    elif path.suffix == ".parquet":
+        import pyarrow  # here, because it is slow to import
+        from pyarrow import parquet
+
+        parquet.write_table(pyarrow.table(tidy), new)
+    else:
+        raise ValueError(f"the table must end in .csv or .parquet, not {path.name!r}")
+    new.replace(path)
+    return path
+
+
+def _checked(columns: Mapping[str, npt.NDArray[Any]]) -> Columns:
+    arrays = {name: np.asarray(values) for name, values in columns.items()}
+    rows = {len(values) if values.ndim else -1 for values in arrays.values()}
+    if len(rows) != 1 or -1 in rows:
+        shapes = ", ".join(f"{name} {values.shape}" for name, values in arrays.items())
+        raise ValueError(f"the task must return arrays with the same number of rows, not {shapes}")
+    return arrays
+
+
+def _join(parts: dict[int, Columns]) -> Columns:
+    ordered = [parts[first] for first in sorted(parts)]
+    return {name: np.concatenate([part[name] for part in ordered]) for name in ordered[0]}
+
+
+class _Store:
+    """Finished chunks of one experiment, a file each that is there as a whole or not at all."""
+
+    def __init__(self, folder: Path, identity: Mapping[str, Any]) -> None:
+        text = json.dumps(identity, sort_keys=True, default=str)
+        self._folder = folder
+        name = hashlib.sha256(text.encode()).hexdigest()
+        label = folder / "experiment"
+        if not (label.is_file() and label.read_text(encoding="utf-8") == name):
+            discard(folder)
+            folder.mkdir(parents=True)
+            label.write_text(name, encoding="utf-8")
+
+    def _path(self, first: int, count: int) -> Path:
+        return self._folder / f"{first}-{first + count - 1}.npz"
+
+    def write(self, first: int, count: int, columns: Columns) -> None:
+        path = self._path(first, count)
+        new = path.with_suffix(".new")
+        with new.open("wb") as file:
+            np.savez(file, **columns)  # type: ignore[arg-type]
+        new.replace(path)
+
+    def read(self, first: int, count: int) -> Columns | None:
+        path = self._path(first, count)
+        if not path.is_file():
+            return None
+        try:
+            with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
+                return {name: arrays[name] for name in arrays.files}
+        except (ValueError, OSError, EOFError, zipfile.BadZipFile):
+            return None  # damaged by what stopped the program: done again
