@@ -258,6 +258,53 @@ def capture_figure(
     return figure
 
 
+def slave_figure(
+    truth: Floats,
+    estimate: Floats,
+    masters: Floats,
+    *,
+    time_s: Floats,
+    error_m: Floats,
+    sigma_m: Floats,
+    rms_m: Floats,
+    title: str,
+) -> Figure:
+    """Draw the tracks of a slave and its masters, and the slave's error over time.
+
+    Parameters
+    ----------
+    truth, estimate : ndarray, shape (T, 2)
+        Positions of the slave in one run, m.
+    masters : ndarray, shape (T, M, 2)
+        True positions of the masters, m.
+    time_s : ndarray, shape (T,)
+        Times, s.
+    error_m, sigma_m : ndarray, shape (T,)
+        Length of the error in that run, and the standard deviation that the filter claims, m.
+    rms_m : ndarray, shape (T,)
+        Root mean square of the error over all runs, m.
+    title : str
+        What the reader sees.
+    """
+    figure = new_figure((8.0, 4.0), title)
+    plane, axes = figure.subplots(1, 2)
+    for n in range(masters.shape[1]):
+        label = "masters" if n == 0 else None
+        plane.plot(masters[:, n, 0], masters[:, n, 1], color=VERMILION, label=label)
+    plane.plot(truth[:, 0], truth[:, 1], color=BLACK, linewidth=1.6, label="slave, truth")
+    plane.plot(estimate[:, 0], estimate[:, 1], "--", color=BLUE, label="slave, one run")
+    plane.set(xlabel="x / m", ylabel="y / m")
+    axes.plot(time_s, rms_m, color=BLACK, linewidth=1.6, label="rms, all runs")
+    axes.plot(time_s, error_m, "--", color=BLUE, label="one run")
+    axes.plot(time_s, sigma_m, ":", color=BLUE, label="claimed sigma, that run")
+    axes.set(xlabel="time / s", ylabel="position error / m")
+    axes.set_ylim(bottom=0)
+    for one in (plane, axes):
+        style(one)
+        one.legend(fontsize=8)
+    return figure
+
+
 def save(figure: Figure, path: Path) -> Path:
     """Write a figure as PNG, the same bytes for the same figure, and return the path."""
     figure.savefig(path, format="png", dpi=DPI, metadata={"Software": None})

@@ -57,6 +57,10 @@ class Terminal:
         if self.as_json:
             typer.echo(to_json(value))
 
+    def warn(self, message: str) -> None:
+        """Print one line on stderr, unless quiet."""
+        self._messages.print(f"[bold yellow]Note:[/] {escape(message)}")
+
     def fail(self, message: str, code: ExitCode) -> NoReturn:
         """Print one line on stderr and end."""
         self._err.print(f"[bold red]Error:[/] {escape(message)}")
@@ -135,6 +139,13 @@ def positive(value: float | None) -> float | None:
     """Option callback: a finite number above zero."""
     if value is not None and not (math.isfinite(value) and value > 0):
         raise typer.BadParameter(f"{value} is not a finite number above 0.")
+    return value
+
+
+def not_negative(value: float) -> float:
+    """Option callback: a finite number of at least zero."""
+    if not (math.isfinite(value) and value >= 0):
+        raise typer.BadParameter(f"{value} is not a finite number of at least 0.")
     return value
 
 

@@ -13,6 +13,7 @@ from auvest.commands.console import EXIT_CODES, ExitCode, Terminal
 from auvest.commands.files import write_csv
 from auvest.commands.version import version
 from auvest.reproduce import aukf, aukf_page
+from auvest.reproduce.claims import Claim
 
 HELP = f"""Reproduce the AUKF paper (Deng, Yin, Duan 2019): Figs 1 to 10 and every claim.
 
@@ -105,7 +106,7 @@ def draw_figures(
         progress(number, total)
 
 
-def _table(claims: list[aukf_page.Claim]) -> Table:
+def _table(claims: list[Claim]) -> Table:
     table = Table(title="Claims of the paper", title_justify="left", title_style="bold")
     for title in ("where", "the paper", "verdict"):
         table.add_column(title)

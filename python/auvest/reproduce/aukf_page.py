@@ -6,8 +6,6 @@ follow from the numbers by the rules written here.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-
 import numpy as np
 
 from auvest import MahalanobisInterval
@@ -28,6 +26,7 @@ from auvest.reproduce.aukf import (
     rmse,
     roughness,
 )
+from auvest.reproduce.claims import NO, PARTLY, YES, Claim, tally
 from auvest.reproduce.markdown import fill, number, series, table
 from auvest.scenarios.paper_aukf import (
     ASSUMPTIONS,
@@ -39,11 +38,8 @@ from auvest.scenarios.paper_aukf import (
     NoiseKind,
 )
 
-# Verdicts.
-YES = "reproduced"
-PARTLY = "partly reproduced"
+# Verdicts besides those of every paper.
 PRESET = "reproduced with preset figure3; contradicts Table 1"
-NO = "not reproduced"
 CONTRADICTED = "contradicted by the paper's own equations"
 UNDEFINED = "cannot be judged: not stated"
 
@@ -51,20 +47,6 @@ UNDEFINED = "cannot be judged: not stated"
 SHOWN_STEPS = (0, 1, 2, 4, 8, 15, 30, 59)
 #: What an independent prototype gave there, means of 40 runs, s.
 PROTOTYPE_S = (0.50, 0.48, 0.31, 0.38, 0.52, 0.57, 0.60, 0.60)
-
-
-@dataclass(frozen=True)
-class Claim:
-    """One statement of the paper, what we measure about it, and the verdict."""
-
-    where: str
-    paper: str
-    measured: str
-    verdict: str
-
-    def as_dict(self) -> dict[str, str]:
-        """For JSON."""
-        return asdict(self)
 
 
 def claims(result: Reproduction) -> list[Claim]:
@@ -367,10 +349,6 @@ def page(result: Reproduction) -> str:
 
 
 def _head(result: Reproduction, judged: list[Claim]) -> str:
-    counts: dict[str, int] = {}
-    for claim in judged:
-        counts[claim.verdict] = counts.get(claim.verdict, 0) + 1
-    tally = "; ".join(f"{count} {verdict}" for verdict, count in counts.items())
     mean = intervals(result.noises["normal"].aukf).mean(axis=0)
     more = {kind: excess(case.aukf, case.ukf) for kind, case in result.noises.items()}
     equal = {
@@ -400,7 +378,7 @@ In short:
   {_by_noise(at_samples)}, at even times {_by_noise(equal)}.
 - **tau does not see the size of the error**, only how it changed since the step before (finding 4).
 
-Of {len(judged)} claims: {tally}.
+Of {len(judged)} claims: {tally(judged)}.
 """
 
 

@@ -1,0 +1,447 @@
+"""``auvest simulate slatf``: the SLATF paper's scenario with any filter and noise."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+import typer
+from rich.table import Table
+
+from auvest import Status, metrics, montecarlo
+from auvest.commands import console
+from auvest.commands.console import EXIT_CODES, ExitCode, Terminal, refuse_given
+from auvest.commands.files import write_csv
+from auvest.commands.version import version
+from auvest.scenarios.paper_aukf import DTypeName
+from auvest.scenarios.paper_slatf import LEVELS, PARTICLES, RUNS
+from auvest.scenarios.slat import SlatResult, SlatScenario, paper_masters, simulate
+from auvest.slat import (
+    MAX_MASTERS,
+    DeadReckoning,
+    EkfSlat,
+    Lanes,
+    ParticleSlatFilter,
+    Resampling,
+    Slatf,
+    SlatFilter,
+    SlatfJoint,
+)
+
+Floats = npt.NDArray[np.float64]
+
+HELP = f"""Simulate the SLATF paper's scenario and show errors and consistency.
+
+Communication fails for 400 s; a slave that can only dead-reckon pings its master (Lu, Chen, Liu,
+Ma, He 2020, section 7). Finished runs are kept: the same command goes on where it was stopped.
+
+Examples:
+
+  auvest simulate slatf
+
+  auvest simulate slatf --filter slatf1 --level 4 --particles 1000
+
+  auvest simulate slatf --masters 3 --association unknown --gate 16
+
+  auvest simulate slatf --filter ekf-slat --runs 1000 --table parquet --json > ekf.json
+
+{EXIT_CODES}
+"""
+
+_FILTER = "Filter"
+_WORLD = "World"
+
+FilterOption = Literal["slatf1", "slatf2", "slatf-joint", "ekf-slat", "dead-reckoning"]
+_PARTICLE_FILTERS: tuple[FilterOption, ...] = ("slatf1", "slatf2", "slatf-joint")
+_TITLES: dict[FilterOption, str] = {
+    "slatf1": "SLATF 1.0",
+    "slatf2": "SLATF 2.0",
+    "slatf-joint": "SLATF, joint",
+    "ekf-slat": "EKF-SLAT",
+    "dead-reckoning": "dead reckoning",
+}
+
+
+def command(
+    ctx: typer.Context,
+    filter_name: Annotated[
+        FilterOption, typer.Option("--filter", help="The filter.", rich_help_panel=_FILTER)
+    ] = "slatf2",
+    particles: Annotated[
+        int,
+        typer.Option(
+            min=1, max=1_000_000, help="N (slatf1, slatf2, slatf-joint).", rich_help_panel=_FILTER
+        ),
+    ] = PARTICLES,
+    resampling: Annotated[
+        Resampling,
+        typer.Option(
+            help="Resampling policy (slatf1, slatf2, slatf-joint).", rich_help_panel=_FILTER
+        ),
+    ] = "systematic",
+    gate: Annotated[
+        float,
+        typer.Option(
+            callback=console.not_negative,
+            help="NIS beyond which an echo says nothing; 0: no gate.",
+            rich_help_panel=_FILTER,
+        ),
+    ] = 0.0,
+    heading_bias: Annotated[
+        Literal["compensate", "keep"],
+        typer.Option(
+            help="Bias of the heading's noise: make up for it, or keep it, as in the paper.",
+            rich_help_panel=_FILTER,
+        ),
+    ] = "compensate",
+    dtype: Annotated[
+        DTypeName,
+        typer.Option(
+            help="Precision; float32 gives the bits of the vehicle.", rich_help_panel=_FILTER
+        ),
+    ] = "float64",
+    lanes: Annotated[
+        Lanes | None,
+        typer.Option(
+            help="Instruction set of the particles; the bits are the same.",
+            show_default="the widest here",
+            rich_help_panel=_FILTER,
+        ),
+    ] = None,
+    level: Annotated[
+        int,
+        typer.Option(
+            min=1, max=len(LEVELS), help="Noise level of section 7.", rich_help_panel=_WORLD
+        ),
+    ] = 3,
+    range_noise: Annotated[
+        float | None,
+        typer.Option(
+            callback=console.positive,
+            help="Noise of the range, m.",
+            show_default="of the level",
+            rich_help_panel=_WORLD,
+        ),
+    ] = None,
+    bearing_noise: Annotated[
+        float | None,
+        typer.Option(
+            callback=console.positive,
+            help="Noise of the bearing, rad.",
+            show_default="of the level",
+            rich_help_panel=_WORLD,
+        ),
+    ] = None,
+    masters: Annotated[
+        int, typer.Option(min=1, max=MAX_MASTERS, help="Masters.", rich_help_panel=_WORLD)
+    ] = 1,
+    association: Annotated[
+        Literal["known", "unknown"],
+        typer.Option(help="Whether the slave knows whose echo it hears.", rich_help_panel=_WORLD),
+    ] = "known",
+    plan: Annotated[
+        Literal["known", "unknown"],
+        typer.Option(
+            help="Whether the slave knows how the masters turn, u of Eq. (4).",
+            rich_help_panel=_WORLD,
+        ),
+    ] = "known",
+    dropout: Annotated[
+        float,
+        typer.Option(
+            callback=console.fraction,
+            help="Probability that an echo is lost.",
+            rich_help_panel=_WORLD,
+        ),
+    ] = 0.0,
+    outlier: Annotated[
+        float,
+        typer.Option(
+            callback=console.fraction,
+            help="Probability that an echo is wrong by 100 standard deviations.",
+            rich_help_panel=_WORLD,
+        ),
+    ] = 0.0,
+    duration: Annotated[
+        float,
+        typer.Option(
+            callback=console.positive, help="Length of the outage, s.", rich_help_panel=_WORLD
+        ),
+    ] = SlatScenario().duration_s,
+    runs: console.Runs = RUNS,
+    seed: console.Seed = 1,
+    workers: console.Workers = None,
+    output: Annotated[
+        Path,
+        typer.Option(
+            file_okay=False,
+            help="Folder for figure, tables and JSON; made if missing.",
+            rich_help_panel="Output",
+        ),
+    ] = Path("auvest-output/simulate-slatf"),
+    table: Annotated[
+        Literal["csv", "parquet"],
+        typer.Option(help="Format of the table of runs.", rich_help_panel="Output"),
+    ] = "csv",
+    no_figure: Annotated[
+        bool, typer.Option("--no-figure", help="Draw nothing.", rich_help_panel="Output")
+    ] = False,
+    as_json: console.Json = False,
+    quiet: console.Quiet = False,
+) -> None:
+    """Simulate; the help text is :data:`HELP`."""
+    terminal = Terminal(as_json=as_json, quiet=quiet)
+    if filter_name not in _PARTICLE_FILTERS:
+        refuse_given(ctx, ("particles", "resampling"), "belongs to slatf1, slatf2 and slatf-joint.")
+    if filter_name not in ("slatf1", "slatf2"):
+        refuse_given(ctx, ("lanes",), "belongs to slatf1 and slatf2.")
+    if filter_name == "dead-reckoning":
+        refuse_given(ctx, ("gate",), "does nothing: dead reckoning hears no echo.")
+    noise = LEVELS[level - 1]
+    with terminal.usage_errors():
+        scenario = SlatScenario(
+            masters=paper_masters(masters),
+            duration_s=duration,
+            sigma_range_m=noise.sigma_range_m if range_noise is None else range_noise,
+            sigma_bearing_rad=noise.sigma_bearing_rad if bearing_noise is None else bearing_noise,
+            identified=association == "known",
+            plan_known=plan == "known",
+            dropout=dropout,
+            outlier=outlier,
+            runs=runs,
+            seed=seed,
+        )
+        filter_ = _filter(
+            filter_name,
+            scenario,
+            compensate_bias=heading_bias == "compensate",
+            gate=gate,
+            particles=particles,
+            resampling=resampling,
+            lanes=lanes,
+            dtype=dtype,
+        )
+    settings = {
+        "filter": filter_name,
+        **(
+            {"particles": particles, "resampling": resampling}
+            if isinstance(filter_, ParticleSlatFilter)
+            else {}
+        ),
+        **({"lanes": filter_.lanes} if isinstance(filter_, Slatf) else {}),
+        "gate": gate,
+        "heading_bias": heading_bias,
+        "dtype": dtype,
+        "scenario": asdict(scenario),
+    }
+    terminal.make_folder(output)
+
+    interrupted = False
+    store = output / ".runs"
+    with terminal.progress("runs") as progress, terminal.writing(output):
+        try:
+            result = simulate(
+                filter_,
+                scenario,
+                workers=workers,
+                progress=progress,
+                store=store,
+                settings=_identity(settings),
+            )
+        except montecarlo.Interrupted as stop:
+            interrupted = True
+            if stop.partial is None:
+                terminal.fail("interrupted: no run was done", ExitCode.INTERRUPTED)
+            result = stop.partial
+
+    values = measures(result)
+    per_ping = means_per_ping(result)
+    with terminal.writing(output):
+        files = {
+            "per_ping": write_csv(output / "per_ping.csv", per_ping),
+            "runs": montecarlo.write_table(output / f"runs.{table}", per_run(result)),
+        }
+        if not no_figure:
+            files["figure"] = _draw(output / "figure.png", result, _TITLES[filter_name])
+        files["results"] = output / "results.json"
+        document = {
+            "command": "simulate slatf",
+            "version": version(),
+            "settings": settings,
+            "complete": not interrupted,
+            "results": values,
+            "per_ping": per_ping,
+            "files": {name: str(path) for name, path in files.items()},
+        }
+        files["results"].write_text(console.to_json(document) + "\n", encoding="utf-8")
+
+    terminal.result_json(document)
+    terminal.result(_table(values, scenario, _TITLES[filter_name]))
+    for name, path in files.items():
+        terminal.result(f"{name.replace('_', ' '):9} {path}")
+    if interrupted:
+        terminal.fail(
+            f"interrupted: {values['runs']} of {runs} runs are done and kept; the same command "
+            "goes on from there",
+            ExitCode.INTERRUPTED,
+        )
+    montecarlo.discard(store)
+    if values["failed_runs"]:
+        first = int(np.flatnonzero(result.failed)[0])
+        terminal.fail(
+            f"{values['failed_runs']} of {values['runs']} runs failed; the first, run {first}: "
+            f"{Status(int(result.status[first])).name}",
+            ExitCode.FAILED,
+        )
+
+
+def _filter(
+    name: FilterOption,
+    scenario: SlatScenario,
+    *,
+    compensate_bias: bool,
+    gate: float,
+    particles: int,
+    resampling: Resampling,
+    lanes: Lanes | None,
+    dtype: DTypeName,
+) -> SlatFilter:
+    x0 = np.array([scenario.slave.x_m, scenario.slave.y_m])
+    P0 = np.zeros((2, 2))
+    motion = replace(scenario.motion, compensate_bias=compensate_bias)
+    if name == "dead-reckoning":
+        return DeadReckoning(x0, P0, motion=motion, dtype=dtype)
+    if name == "ekf-slat":
+        return EkfSlat(x0, P0, motion=motion, sonar=scenario.sonar, gate=gate, dtype=dtype)
+    if name == "slatf-joint":
+        return SlatfJoint(
+            x0,
+            P0,
+            particles=particles,
+            motion=motion,
+            sonar=scenario.sonar,
+            resampling=resampling,
+            gate=gate,
+            max_masters=len(scenario.masters),
+            dtype=dtype,
+        )
+    return Slatf(
+        x0,
+        P0,
+        version=1 if name == "slatf1" else 2,
+        particles=particles,
+        motion=motion,
+        sonar=scenario.sonar,
+        resampling=resampling,
+        gate=gate,
+        lanes=lanes,
+        dtype=dtype,
+    )
+
+
+def _identity(settings: dict[str, Any]) -> dict[str, Any]:
+    """Say what a run depends on: neither their number nor the lanes."""
+    scenario = {name: value for name, value in settings["scenario"].items() if name != "runs"}
+    kept = {name: value for name, value in settings.items() if name != "lanes"}
+    return {**kept, "scenario": scenario, "version": version()}
+
+
+def measures(result: SlatResult) -> dict[str, Any]:
+    """Compute the numbers of the table."""
+    return {
+        "runs": len(result.status),
+        "failed_runs": int(result.failed.sum()),
+        "rmse_m": result.rmse_m,
+        "rmse_standard_error_m": result.rmse_standard_error_m,
+        "mean_error_m": float(np.nanmean(result.distance_m)),
+        "end_error_m": float(np.sqrt(_mean(np.square(result.distance_m[:, -1:]))[0])),
+        "master_rmse_m": metrics.rmse(result.master_error),
+        "nees_mean": float(np.nanmean(result.nees)),
+        "covered_95": result.covered,
+        "resamplings_per_run": float(result.resamplings.mean()),
+        "echoes_per_run": float(result.heard.mean()),
+    }
+
+
+def means_per_ping(result: SlatResult) -> dict[str, Floats]:
+    """Average over the runs, per ping."""
+    master = np.square(result.master_error).sum(axis=-1).mean(axis=-1)
+    return {
+        "time_s": result.time_s,
+        "rms_error_m": np.sqrt(_mean(np.square(result.distance_m))),
+        "mean_error_m": _mean(result.distance_m),
+        "master_rms_error_m": np.sqrt(_mean(master)),
+        "nees": _mean(result.nees),
+        "effective_size": _mean(result.effective_size),
+    }
+
+
+def per_run(result: SlatResult) -> dict[str, npt.NDArray[Any]]:
+    """Collect one row per run."""
+    return {
+        "run": np.arange(len(result.status)),
+        "rmse_m": result.run_rmse_m,
+        "mean_error_m": np.nanmean(result.distance_m, axis=1),
+        "end_error_m": result.distance_m[:, -1],
+        "resamplings": result.resamplings,
+        "echoes": result.heard,
+        "log_likelihood": result.log_likelihood,
+        "status": result.status,
+    }
+
+
+def _mean(values: Floats) -> Floats:
+    """Mean over the runs of what is known at each ping."""
+    known = ~np.isnan(values)
+    count = known.sum(axis=0)
+    total = np.where(known, values, 0.0).sum(axis=0)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+def _draw(path: Path, result: SlatResult, title: str) -> Path:
+    from auvest import plots  # here, because matplotlib takes long to import
+
+    scenario = result.scenario
+    name = f"{title}: RMSE {result.rmse_m:.3g} m, {scenario.sigma_range_m:g} m"
+    return plots.save(
+        plots.slave_figure(
+            result.truth,
+            result.truth + result.error[0],
+            result.masters,
+            time_s=result.time_s,
+            error_m=result.distance_m[0],
+            sigma_m=np.sqrt(np.trace(result.covariance[0], axis1=-2, axis2=-1)),
+            rms_m=means_per_ping(result)["rms_error_m"],
+            title=f"{name}, {scenario.sigma_bearing_rad:g} rad",
+        ),
+        path,
+    )
+
+
+def _table(values: dict[str, Any], scenario: SlatScenario, title: str) -> Table:
+    table = Table(
+        title=f"{title}: {values['runs']} runs of {scenario.duration_s:g} s, sonar "
+        f"{scenario.sigma_range_m:g} m, {scenario.sigma_bearing_rad:g} rad, "
+        f"{len(scenario.masters)} master(s), seed {scenario.seed}",
+        title_justify="left",
+        title_style="bold",
+    )
+    table.add_column("measure")
+    table.add_column("value", justify="right")
+    rows = {
+        "position RMSE / m": f"{values['rmse_m']:.2f} ± {values['rmse_standard_error_m']:.2f}",
+        "mean error / m": f"{values['mean_error_m']:.2f}",
+        "rms error at the end / m": f"{values['end_error_m']:.2f}",
+        "RMSE of the masters / m": f"{values['master_rmse_m']:.2f}",
+        "mean NEES (2 expected)": f"{values['nees_mean']:.2f}",
+        "truth in the 95 % ellipse": f"{values['covered_95']:.0%}",
+        "resamplings per run": f"{values['resamplings_per_run']:.1f}",
+        "echoes per run": f"{values['echoes_per_run']:.1f}",
+        "failed runs": f"{values['failed_runs']}",
+    }
+    for name, value in rows.items():
+        table.add_row(name, value)
+    return table

@@ -1,0 +1,158 @@
+"""Real robots: the cutting of tracks and the judgement on a made-up recording, and the page."""
+
+import json
+import math
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import ROOT
+from typer.testing import CliRunner
+
+from auvest.cli import app
+from auvest.reproduce import mrclam6
+
+PAGE = ROOT / "docs" / "reproduction" / "mrclam6"
+DATA = os.environ.get("AUVEST_DATA")
+needs_data = pytest.mark.skipif(
+    DATA is None, reason="AUVEST_DATA does not name the folder of the validation recordings"
+)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Robot 1 drives along x at 0.1 m/s and sees robot 2, which stands at (5, 3)."""
+    files = tmp_path / "mrclam6"
+    files.mkdir()
+    times = np.arange(0, 100.05, 0.1)
+    with (files / "groundtruth.csv").open("w") as file:
+        file.write("t,robot,x,y,theta\n")
+        for t in times:
+            file.write(f"{t:.4f},1,{0.1 * t:.6f},0,0\n")
+            if not 60 < t < 61:  # no truth for a second
+                file.write(f"{t:.4f},2,5,3,0\n")
+            for robot in (3, 4, 5):  # they stand, too
+                file.write(f"{t:.4f},{robot},9,9,0\n")
+    speed = 0.1 / mrclam6.CALIBRATION[0][0]
+    turn = -mrclam6.CALIBRATION[1][1] / mrclam6.CALIBRATION[1][0]
+    with (files / "odometry.csv").open("w") as file:
+        file.write("t,robot,v,w\n")
+        for robot in mrclam6.ROBOTS:
+            file.write(f"0,{robot},{speed if robot == 1 else 0:.9f},{turn:.9f}\n")
+    with (files / "sightings.csv").open("w") as file:
+        file.write("t,observer,subject,range,bearing\n")
+        # 20 s, a gap of 7 s, 10 s (too short), a gap, 40 s of which the truth leaves out a second.
+        for begin, end in ((1, 21), (28, 38), (45, 85)):
+            for t in np.arange(begin, end + 0.1, 0.5):
+                dx = 5 - 0.1 * t
+                file.write(f"{t:.4f},1,2,{math.hypot(dx, 3):.6f},{math.atan2(3, dx):.6f}\n")
+                file.write(f"{t:.4f},1,-1,9,1\n")  # an unknown barcode
+    return tmp_path
+
+
+def test_tracks_are_cut_at_gaps(folder):
+    tracks = mrclam6.Recording(folder).tracks()
+    assert [(t.slave, t.master, t.time_s[0], t.time_s[-1]) for t in tracks] == [
+        (1, 2, 1, 21),
+        (1, 2, 45, 85),
+    ]
+    track = tracks[0]
+    assert len(track.time_s) == 201  # steps of 0.1 s
+    assert len(track.z) == 40
+    np.testing.assert_allclose(track.u, [[0.1, 0]] * 200, atol=1e-8)
+    np.testing.assert_allclose(track.slave_truth[:, 0], 0.1 * track.time_s, atol=1e-6)
+    np.testing.assert_allclose(track.master_truth, [[5, 3]] * 201)
+    # Sightings while there is no truth of the master are left out.
+    assert not ((tracks[1].z_time_s > 60.05) & (tracks[1].z_time_s < 60.95)).any()
+
+
+def test_filters_follow_without_noise(folder):
+    track = mrclam6.Recording(folder).tracks()[0]
+    # With readings and sightings that are exact, errors lie below what their noise would give.
+    drift_m = mrclam6.SPEED_DENSITY * math.sqrt(track.time_s[-1] - track.time_s[0])
+    for name in mrclam6.NAMES:
+        figures = mrclam6.measure([track], [mrclam6.follow(track, name)])
+        if name == "dead_reckoning":
+            assert figures.slave_m < 1e-5
+        else:
+            assert figures.slave_m < drift_m
+            assert figures.relative_m < mrclam6.SONAR.sigma_range_m
+
+
+def test_first_sighting_is_a_place_with_the_covariance_of_range_and_bearing():
+    x, p = mrclam6.first_seen(np.array([1.0, 2.0, math.pi / 2]), np.array([4.0, math.pi / 2]))
+    np.testing.assert_allclose(x, [-3, 2, 0, 0, 0, 0], atol=1e-12)
+    sonar = mrclam6.SONAR
+    expected = np.diag([sonar.sigma_range_m, 4 * sonar.sigma_bearing_rad]) ** 2
+    np.testing.assert_allclose(p[:2, :2], expected, atol=1e-15)
+
+
+def test_rmse_by_hand():
+    time_s = np.array([0.0, 1.0, 2.0])
+    none = np.zeros((0, 2))
+    tracks = [
+        mrclam6.Track(
+            1, 2, time_s, np.zeros((2, 2)), none[:, 0], none, np.zeros(2),
+            np.zeros((3, 3)), np.zeros((3, 2)),
+        )
+    ] * 2  # fmt: skip
+    off = mrclam6.Path2D(slave=np.full((2, 2), 3.0), master=np.full((2, 2), 4.0))
+    on = mrclam6.Path2D(slave=np.zeros((2, 2)), master=np.zeros((2, 2)))
+    figures = mrclam6.measure(tracks, [off, on])
+    assert figures.slave_m == pytest.approx(3)  # sqrt((18 + 0) / 2)
+    assert figures.relative_m == pytest.approx(1)
+    assert figures.slave_tracks_m == pytest.approx(math.sqrt(18) / 2)
+    assert figures.relative_tracks_m == pytest.approx(math.sqrt(2) / 2)
+
+
+def test_command_on_a_made_up_recording(folder, tmp_path):
+    arguments = ["reproduce", "mrclam6", "--data", str(folder), "--runs", "1", "--json", "--quiet"]
+    output = tmp_path / "out"
+    done = CliRunner().invoke(app, [*arguments, "--output", str(output)])
+    assert done.exit_code == 0, done.output
+    results = json.loads(done.stdout)
+    assert results["tracks"] == 2
+    assert [row["filter"] for row in results["filters"]] == list(mrclam6.NAMES)
+    assert (output / "tracks.png").stat().st_size > 10_000
+    assert (output / "README.md").read_text() == mrclam6.page(results)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [([], "--data is missing"), (["--data", "nowhere"], "groundtruth.csv is missing")],
+)
+def test_missing_data_is_said(arguments, says, tmp_path, monkeypatch):
+    monkeypatch.delenv("AUVEST_DATA", raising=False)
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(app, ["reproduce", "mrclam6", *arguments])
+    assert done.exit_code == 2
+    assert says in " ".join(done.stderr.split())
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.fixture(scope="module")
+def committed():
+    return json.loads((PAGE / "results.json").read_text())
+
+
+def test_committed_page_is_that_of_the_committed_results(committed):
+    assert mrclam6.page(committed) == (PAGE / "README.md").read_text()
+
+
+def test_committed_results_meet_the_targets(committed):
+    assert committed["tracks"] == 47
+    assert committed["met"] is True
+
+
+@needs_data
+def test_committed_results_are_what_the_code_gives(committed):
+    recording = mrclam6.Recording(Path(DATA))
+    tracks = recording.tracks()
+    assert len(tracks) == committed["tracks"]
+    rows = {row["filter"]: row for row in committed["filters"]}
+    for name in ("dead_reckoning", "ekf_slat"):
+        found = mrclam6.measure(tracks, [mrclam6.follow(track, name) for track in tracks])
+        assert found.slave_m == pytest.approx(rows[name]["slave_rmse_m"], rel=1e-6)
+        if name == "ekf_slat":
+            assert found.relative_m == pytest.approx(rows[name]["relative_rmse_m"], rel=1e-6)
