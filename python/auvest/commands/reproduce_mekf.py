@@ -1,0 +1,129 @@
+"""``auvest reproduce mekf``: the M-estimation EKF paper beside what we measure."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from auvest.commands import console
+from auvest.commands.console import EXIT_CODES, ExitCode, Terminal
+from auvest.commands.files import write_csv
+from auvest.commands.version import version
+from auvest.reproduce import mekf, mekf_page
+
+HELP = f"""Reproduce the M-estimation EKF paper (Li, Du, Fan, Chen, Mao, Luo 2020): Figs 5 and 6.
+
+Range-only cooperative localisation with outliers: EKF, IGG, Huber and Hampel over contamination,
+message timing and kinds of noise; consistency; lock-out. Writes the figures as PNG and CSV, a page
+README.md and results.json.
+
+Examples:
+
+  auvest reproduce mekf
+
+  auvest reproduce mekf --runs 10 --output results
+
+  auvest reproduce mekf --json --quiet | jq .contamination
+
+{EXIT_CODES}
+"""
+
+
+def command(
+    runs: Annotated[
+        int, typer.Option("--runs", min=2, max=500, help="Monte Carlo runs of each world.")
+    ] = mekf.DEFAULT_RUNS,
+    seed: console.Seed = mekf.DEFAULT_SEED,
+    workers: console.Workers = None,
+    output: Annotated[
+        Path,
+        typer.Option(
+            file_okay=False, help="Folder for the page; made if missing.", rich_help_panel="Output"
+        ),
+    ] = Path("auvest-output/reproduce-mekf"),
+    as_json: console.Json = False,
+    quiet: console.Quiet = False,
+) -> None:
+    """Reproduce; the help text is :data:`HELP`."""
+    terminal = Terminal(as_json=as_json, quiet=quiet)
+    terminal.make_folder(output)
+    done: list[Path] = []
+    try:
+        with terminal.progress("experiments") as progress, terminal.usage_errors():
+            result = mekf.measure(runs=runs, seed=seed, workers=workers, progress=progress)
+        claims = mekf_page.claims(result)
+        document = {
+            "command": "reproduce mekf",
+            "version": version(),
+            **mekf.summary(result),
+            "claims": [claim.as_dict() for claim in claims],
+        }
+        with terminal.writing(output):
+            write_results(output, result, document, done)
+        with terminal.progress("figures") as progress, terminal.writing(output):
+            draw_figures(output, result, progress, done)
+    except KeyboardInterrupt:
+        terminal.fail(
+            f"interrupted: {len(done)} files are written to {output}", ExitCode.INTERRUPTED
+        )
+    terminal.result_json(document)
+    terminal.result(_claims(claims))
+    terminal.result(_kernels(result))
+    terminal.result(f"page      {output / 'README.md'}")
+    terminal.result(f"figures   {output / 'fig05.png'}, fig06.png, kernels.png, consistency.png")
+    terminal.result(f"results   {output / 'results.json'}")
+    if result.failed_runs:
+        terminal.fail(f"{result.failed_runs} runs failed; numbers are missing", ExitCode.FAILED)
+
+
+def write_results(
+    folder: Path, result: mekf.Reproduction, document: dict[str, object], done: list[Path]
+) -> None:
+    """Write results.json, the CSV files and the page; ``done`` gets each path when it is there."""
+    path = folder / "results.json"
+    path.write_text(console.to_json(document) + "\n", encoding="utf-8")
+    done.append(path)
+    for stem, table in mekf.tables(result).items():
+        done.append(write_csv(folder / f"{stem}.csv", table))
+    path = folder / "README.md"
+    path.write_text(mekf_page.page(result), encoding="utf-8")
+    done.append(path)
+
+
+def draw_figures(
+    folder: Path,
+    result: mekf.Reproduction,
+    progress: console.ProgressCallback,
+    done: list[Path],
+) -> None:
+    """Write the PNG files."""
+    from auvest import plots  # here, because matplotlib takes long to import
+    from auvest.reproduce import mekf_figures
+
+    total = len(mekf_figures.FIGURES)
+    for number, (stem, draw) in enumerate(mekf_figures.FIGURES.items(), start=1):
+        done.append(plots.save(draw(result), folder / f"{stem}.png"))
+        progress(number, total)
+
+
+def _claims(claims: list[mekf_page.Claim]) -> Table:
+    table = Table(title="Claims and targets", title_justify="left", title_style="bold")
+    for title in ("where", "claim", "measured", ""):
+        table.add_column(title)
+    for claim in claims:
+        table.add_row(claim.where, claim.claim, claim.measured, claim.verdict)
+    return table
+
+
+def _kernels(result: mekf.Reproduction) -> Table:
+    table = Table(title="RMSE / m over contamination", title_justify="left", title_style="bold")
+    table.add_column("outliers")
+    for name in mekf.KERNELS:
+        table.add_column(name, justify="right")
+    for (fraction, sigma), row in result.contamination.items():
+        cells = [f"{row[n].rmse_m:.3f} ± {row[n].standard_error_m:.3f}" for n in mekf.KERNELS]
+        table.add_row(f"{100 * fraction:g} % at {sigma:g} m", *cells)
+    return table

@@ -1,0 +1,356 @@
+"""``auvest simulate mekf``: range-only localisation with any kernel, timing and noise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+import typer
+from rich.table import Table
+
+from auvest import RejectionStreak, Status, metrics
+from auvest.commands import console
+from auvest.commands.console import EXIT_CODES, ExitCode, Terminal
+from auvest.commands.files import write_csv
+from auvest.commands.version import version
+from auvest.kernels import KernelName
+from auvest.scenarios import cooperative
+from auvest.scenarios.cooperative import NoiseKind, RangeNoise, Result, Scenario, Timing
+
+Floats = npt.NDArray[np.float64]
+
+HELP = f"""Simulate range-only cooperative localisation and show errors, weights and consistency.
+
+A slave dead-reckons and ranges to two leaders in turn, every 5 s; some ranges are outliers (Li, Du,
+Fan, Chen, Mao, Luo 2020). Every filter sees the same ranges as the EKF beside it.
+
+Examples:
+
+  auvest simulate mekf
+
+  auvest simulate mekf --kernel huber --outliers 0.2 --timing own-time
+
+  auvest simulate mekf --noise multipath --outlier-sigma 30 --dropout 0.3 --late 0.3
+
+  auvest simulate mekf --displaced 200 --steps 600 --json
+
+{EXIT_CODES}
+"""
+
+_FILTER = "Filter"
+_WORLD = "World"
+_MONTE_CARLO = "Monte Carlo"
+
+_NOISE = RangeNoise()
+
+
+def command(
+    kernel: Annotated[
+        KernelName,
+        typer.Option(help="Robust kernel; unit: the plain filter.", rich_help_panel=_FILTER),
+    ] = "igg",
+    kind: Annotated[
+        Literal["ekf", "ukf"],
+        typer.Option("--filter", help="What the kernel is put into.", rich_help_panel=_FILTER),
+    ] = "ekf",
+    residual: Annotated[
+        Literal["innovation", "post-fit"],
+        typer.Option(help="What the kernel judges.", rich_help_panel=_FILTER),
+    ] = "innovation",
+    rejections: Annotated[
+        int,
+        typer.Option(
+            min=0,
+            max=100,
+            help="Rejections in a row after which the covariance is widened; 0: never.",
+            rich_help_panel=_FILTER,
+        ),
+    ] = RejectionStreak().rejections,
+    dtype: Annotated[
+        Literal["float64", "float32"],
+        typer.Option(
+            help="Precision; float32 gives the bits of the vehicle.", rich_help_panel=_FILTER
+        ),
+    ] = "float64",
+    noise: Annotated[
+        NoiseKind,
+        typer.Option(
+            help="contaminated: outliers of another size; multipath: outliers too long; "
+            "student: Student's t.",
+            rich_help_panel=_WORLD,
+        ),
+    ] = "contaminated",
+    range_noise: Annotated[
+        float,
+        typer.Option(
+            callback=console.positive, help="Scale of the range noise, m.", rich_help_panel=_WORLD
+        ),
+    ] = _NOISE.sigma_m,
+    outliers: Annotated[
+        float,
+        typer.Option(
+            callback=console.fraction, help="Share of the outliers.", rich_help_panel=_WORLD
+        ),
+    ] = 0.05,
+    outlier_sigma: Annotated[
+        float,
+        typer.Option(
+            callback=console.positive, help="Size of the outliers, m.", rich_help_panel=_WORLD
+        ),
+    ] = _NOISE.outlier_sigma_m,
+    degrees_of_freedom: Annotated[
+        int, typer.Option(min=1, max=100, help="Of Student's t.", rich_help_panel=_WORLD)
+    ] = _NOISE.degrees_of_freedom,
+    timing: Annotated[
+        Timing,
+        typer.Option(
+            help="at-once: a range is there when it is measured; own-time: it comes with the next "
+            "message and is taken at its own time; as-if-fresh: the same, the delay ignored.",
+            rich_help_panel=_WORLD,
+        ),
+    ] = "own-time",
+    dropout: Annotated[
+        float,
+        typer.Option(
+            callback=console.fraction, help="Share of messages lost.", rich_help_panel=_WORLD
+        ),
+    ] = 0.0,
+    late: Annotated[
+        float,
+        typer.Option(
+            callback=console.fraction,
+            help="Share of messages that are up to 10 s late.",
+            rich_help_panel=_WORLD,
+        ),
+    ] = 0.0,
+    displaced: Annotated[
+        float,
+        typer.Option(
+            callback=console.finite,
+            help="Error of the start along x that the filter does not know of, m.",
+            rich_help_panel=_WORLD,
+        ),
+    ] = 0.0,
+    steps: Annotated[
+        int,
+        typer.Option(
+            min=2,
+            max=100_000,
+            help="Seconds of each run; 8280: 2.3 h.",
+            rich_help_panel=_MONTE_CARLO,
+        ),
+    ] = cooperative.PAPER_STEPS,
+    runs: console.Runs = 50,
+    seed: console.Seed = 1,
+    workers: console.Workers = None,
+    output: Annotated[
+        Path,
+        typer.Option(
+            file_okay=False,
+            help="Folder for figure, CSV and JSON; made if missing.",
+            rich_help_panel="Output",
+        ),
+    ] = Path("auvest-output/simulate-mekf"),
+    no_figure: Annotated[
+        bool, typer.Option("--no-figure", help="Draw nothing.", rich_help_panel="Output")
+    ] = False,
+    as_json: console.Json = False,
+    quiet: console.Quiet = False,
+) -> None:
+    """Simulate; the help text is :data:`HELP`."""
+    terminal = Terminal(as_json=as_json, quiet=quiet)
+    with terminal.usage_errors():
+        scenario = Scenario(
+            noise=RangeNoise(
+                kind=noise,
+                sigma_m=range_noise,
+                outlier_fraction=outliers,
+                outlier_sigma_m=outlier_sigma,
+                degrees_of_freedom=degrees_of_freedom,
+            ),
+            timing=timing,
+            dropout=dropout,
+            late=late,
+            steps=steps,
+            runs=runs,
+            seed=seed,
+            offset_m=(displaced, 0.0),
+        )
+        recovery = RejectionStreak(rejections=rejections) if rejections else None
+        robust = cooperative.slave_filter(
+            kernel,
+            kind=kind,
+            sigma_range_m=range_noise,
+            recovery=recovery,
+            residual=residual,
+            dtype=dtype,
+        )
+        plain = cooperative.slave_filter(
+            "unit", kind=kind, sigma_range_m=range_noise, recovery=None, dtype=dtype
+        )
+    settings = {
+        "filter": kind,
+        "kernel": {"name": kernel, **asdict(robust.kernel)},
+        "residual": residual,
+        "rejections": rejections,
+        "dtype": dtype,
+        "scenario": asdict(scenario),
+    }
+    terminal.make_folder(output)
+
+    results: dict[str, Result] = {}
+    interrupted = False
+    for name, filter_ in (("plain", plain), ("robust", robust)):
+        with terminal.progress(f"runs, {name}") as progress:
+            try:
+                results[name] = cooperative.simulate(
+                    filter_, scenario, workers=workers, progress=progress
+                )
+            except KeyboardInterrupt as stop:
+                interrupted = True
+                partial: Result | None = getattr(stop, "partial", None)
+                if partial is not None:
+                    results[name] = partial
+                break
+    if not results:
+        terminal.fail("interrupted: no run was done", ExitCode.INTERRUPTED)
+
+    values: dict[str, Any] = {name: measures(result) for name, result in results.items()}
+    if len(values) == 2:
+        values["improvement"] = 1 - values["robust"]["rmse_m"] / values["plain"]["rmse_m"]
+    per_step = means_per_step(results)
+    with terminal.writing(output):
+        files = {"per_step": write_csv(output / "per_step.csv", per_step)}
+        if not no_figure:
+            files["figure"] = _draw(output / "figure.png", results, kernel, kind)
+        files["results"] = output / "results.json"
+        document = {
+            "command": "simulate mekf",
+            "version": version(),
+            "settings": settings,
+            "complete": not interrupted,
+            "results": values,
+            "files": {name: str(path) for name, path in files.items()},
+        }
+        files["results"].write_text(console.to_json(document) + "\n", encoding="utf-8")
+
+    terminal.result_json(document)
+    terminal.result(_table(values, settings))
+    for name, path in files.items():
+        terminal.result(f"{name.replace('_', ' '):9} {path}")
+    if interrupted:
+        terminal.fail("interrupted: what was done is kept", ExitCode.INTERRUPTED)
+    for name, result in results.items():
+        if result.failed.any():
+            first = int(np.flatnonzero(result.failed)[0])
+            terminal.fail(
+                f"{int(result.failed.sum())} of {runs} runs of the {name} filter failed; the "
+                f"first, run {first}, after {int(result.samples[first])} steps: "
+                f"{Status(int(result.status[first])).name}",
+                ExitCode.FAILED,
+            )
+
+
+def measures(result: Result) -> dict[str, Any]:
+    """Compute the numbers of the table."""
+    taken = result.weight[~np.isnan(result.weight)]
+    numbers: dict[str, Any] = {
+        "runs": len(result.status),
+        "failed_runs": int(result.failed.sum()),
+        "rmse_m": result.rmse_m,
+        "rmse_standard_error_m": result.rmse_standard_error_m,
+        "ranges_taken": int(taken.size),
+        "too_late": int(result.too_late.sum()),
+        "full_weight": float((taken == 1).mean()) if taken.size else np.nan,
+        "rejected": float((taken == 0).mean()) if taken.size else np.nan,
+        "recoveries": int(result.recoveries.sum()),
+        "nees_mean": float(np.nanmean(result.nees)),
+    }
+    if taken.size:
+        nis = metrics.nis_consistency(result.nis, 1)
+        numbers["nis_mean"] = nis.mean
+        numbers["nis_bounds_95"] = [nis.low, nis.high]
+    return numbers
+
+
+def means_per_step(results: dict[str, Result]) -> dict[str, Floats]:
+    """Average over the runs, per step: errors and what the filter thinks of them."""
+    steps = next(iter(results.values())).error.shape[1]
+    table = {"time_s": np.arange(1.0, steps + 1)}
+    for name, result in results.items():
+        square = np.square(result.error).sum(axis=-1)
+        variance = np.trace(result.covariance, axis1=-2, axis2=-1)
+        table[f"{name}_rms_error_m"] = np.sqrt(_mean(square))
+        table[f"{name}_sigma_m"] = np.sqrt(_mean(variance))
+        table[f"{name}_nees"] = _mean(result.nees)
+    return table
+
+
+def _mean(values: Floats) -> Floats:
+    """Mean over the runs that got there, NaN where none did."""
+    known = np.isfinite(values)
+    count = known.sum(axis=0)
+    total = np.where(known, values, 0.0).sum(axis=0)
+    mean: Floats = np.divide(total, count, out=np.full(len(count), np.nan), where=count > 0)
+    return mean
+
+
+def _draw(path: Path, results: dict[str, Result], kernel: str, kind: str) -> Path:
+    from auvest import plots  # here, because matplotlib takes long to import
+
+    per_step = means_per_step(results)
+    figure = plots.new_figure((9.0, 6.5), "Position error and weights")
+    error, weights = figure.subplots(2, 1, sharex=True)
+    names = {"plain": (kind.upper(), plots.GREEN), "robust": (f"{kernel}", plots.BLUE)}
+    for name, result in results.items():
+        label, colour = names[name]
+        hours = per_step["time_s"] / 3600
+        error.plot(hours, per_step[f"{name}_rms_error_m"], color=colour, label=label, linewidth=0.9)
+        sigma = per_step[f"{name}_sigma_m"]
+        error.plot(hours, sigma, "--", color=colour, label=f"{label}, its own sigma", linewidth=0.8)
+        if name == "robust":
+            taken = ~np.isnan(result.weight[0])
+            weights.plot(hours[taken], result.weight[0][taken], ".", color=colour, markersize=3)
+    error.set_ylabel("RMS error / m")
+    error.set_ylim(bottom=0)
+    error.legend(fontsize=8)
+    weights.set_ylabel("weight, run 0")
+    weights.set_xlabel("time / h")
+    for panel in (error, weights):
+        plots.style(panel)
+    return plots.save(figure, path)
+
+
+def _table(values: dict[str, Any], settings: dict[str, Any]) -> Table:
+    scenario = settings["scenario"]
+    noise = scenario["noise"]
+    table = Table(
+        title=f"{settings['filter'].upper()} and {settings['kernel']['name']}: {scenario['runs']} "
+        f"runs of {scenario['steps']} s, {noise['kind']} noise, timing {scenario['timing']}, "
+        f"seed {scenario['seed']}, {settings['dtype']}",
+        title_justify="left",
+        title_style="bold",
+    )
+    shown = {name: values[name] for name in ("plain", "robust") if name in values}
+    table.add_column("quantity")
+    for name in shown:
+        table.add_column(name, justify="right")
+    rows: dict[str, Callable[[dict[str, Any]], str]] = {
+        "position RMSE / m": lambda v: f"{v['rmse_m']:.3f} ± {v['rmse_standard_error_m']:.1g}",
+        "ranges taken": lambda v: f"{v['ranges_taken']}",
+        "full weight": lambda v: f"{100 * v['full_weight']:.1f} %",
+        "rejected": lambda v: f"{100 * v['rejected']:.1f} %",
+        "recoveries": lambda v: f"{v['recoveries']}",
+        "older than the memory": lambda v: f"{v['too_late']}",
+        "NIS, mean (1 expected)": lambda v: f"{v.get('nis_mean', np.nan):.3f}",
+        "NEES, mean (2 expected)": lambda v: f"{v['nees_mean']:.3f}",
+    }
+    for title, cell in rows.items():
+        table.add_row(title, *(cell(v) for v in shown.values()))
+    if "improvement" in values:
+        table.add_row("improvement", "", f"{100 * values['improvement']:.1f} %")
+    return table
