@@ -10,7 +10,20 @@ from typing import Annotated
 
 import typer
 
-from auvest.commands import capture, reproduce_aukf, reproduce_intervals, simulate_aukf
+from auvest.commands import (
+    capture,
+    import_log,
+    replay,
+    reproduce_aukf,
+    reproduce_intervals,
+    reproduce_logs,
+    reproduce_mekf,
+    reproduce_mrclam6,
+    reproduce_slatf,
+    simulate_aukf,
+    simulate_mekf,
+    simulate_slatf,
+)
 from auvest.commands.console import EXIT_CODES
 from auvest.commands.version import version
 
@@ -36,6 +49,20 @@ First steps:
 
   auvest reproduce intervals         the interval policies at equal sampling rate
 
+  auvest simulate slatf              a slave without communication pings its master
+
+  auvest reproduce slatf             Table 1 and every figure of the paper beside ours
+
+  auvest simulate mekf               ranges with outliers: EKF and robust kernels
+
+  auvest reproduce mekf              the M-estimation EKF paper beside ours
+
+  auvest reproduce logs              real recordings: our filters beside the baselines
+
+  auvest reproduce mrclam6           real robots: SLATF and EKF-SLAT with an IMM master
+
+  auvest replay --help               your own recordings through any filter
+
   auvest capture --help              record what a board reports, real or simulated
 
 {EXIT_CODES}
@@ -52,9 +79,17 @@ app.add_typer(simulate)
 app.add_typer(reproduce)
 
 app.command("capture", help=capture.HELP)(capture.command)
+app.command("import", help=import_log.HELP)(import_log.command)
+app.command("replay", help=replay.HELP)(replay.command)
 simulate.command("aukf", help=simulate_aukf.HELP)(simulate_aukf.command)
 reproduce.command("aukf", help=reproduce_aukf.HELP)(reproduce_aukf.command)
+simulate.command("slatf", help=simulate_slatf.HELP)(simulate_slatf.command)
+reproduce.command("slatf", help=reproduce_slatf.HELP)(reproduce_slatf.command)
+simulate.command("mekf", help=simulate_mekf.HELP)(simulate_mekf.command)
+reproduce.command("mekf", help=reproduce_mekf.HELP)(reproduce_mekf.command)
 reproduce.command("intervals", help=reproduce_intervals.HELP)(reproduce_intervals.command)
+reproduce.command("logs", help=reproduce_logs.HELP)(reproduce_logs.command)
+reproduce.command("mrclam6", help=reproduce_mrclam6.HELP)(reproduce_mrclam6.command)
 
 
 def _show_version(wanted: bool) -> None:

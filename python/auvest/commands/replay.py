@@ -1,0 +1,142 @@
+"""``auvest replay``: recorded runs through a filter, with tables, a figure and a report of each."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from auvest.commands import console
+from auvest.commands.console import EXIT_CODES, ExitCode, Terminal
+from auvest.commands.version import version
+from auvest.errors import FilterError
+from auvest.logs import LogFolder
+from auvest.replay import Result, Settings, find_settings
+from auvest.replay import replay as run_replay
+from auvest.replay.config import FilterName, packaged_settings
+
+HELP = f"""Replay recorded runs through a filter.
+
+A LOG is a folder of CSV files, as docs/logs.md describes it and 'auvest import' makes it. For each
+the output folder gets a folder with the estimates, measurements and errors as CSV and Parquet, the
+track as TUM text, a figure, one self-contained HTML report and results.json.
+
+Examples:
+
+  auvest import goats14 data/goats14 logs
+
+  auvest replay logs/goats14 --config goats14
+
+  auvest replay logs/robot* --filter ekf --json --quiet | jq '.logs[].rmse_m'
+
+{EXIT_CODES}
+"""
+
+
+def command(
+    logs: Annotated[
+        list[Path], typer.Argument(metavar="LOG...", help="Folders of logs.", show_default=False)
+    ],
+    filter_name: Annotated[
+        FilterName | None,
+        typer.Option(
+            "--filter",
+            help="The filter.",
+            show_default="that of the settings, else robust-ekf for ranges and ukf for fixes",
+        ),
+    ] = None,
+    config: Annotated[
+        str | None,
+        typer.Option(
+            help="Settings: a TOML file, or one of " + ", ".join(packaged_settings()) + ".",
+            metavar="FILE",
+            show_default="defaults; see docs/logs.md",
+        ),
+    ] = None,
+    output: Annotated[
+        Path,
+        typer.Option(
+            file_okay=False,
+            help="Folder for the results; made if missing.",
+            rich_help_panel="Output",
+        ),
+    ] = Path("auvest-output/replay"),
+    as_json: console.Json = False,
+    quiet: console.Quiet = False,
+) -> None:
+    """Replay; the help text is :data:`HELP`."""
+    terminal = Terminal(as_json=as_json, quiet=quiet)
+    with terminal.usage_errors():
+        settings = Settings() if config is None else find_settings(config)
+        folders = [LogFolder(path) for path in logs]
+        names = [folder.path.resolve().name for folder in folders]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"LOG: two logs have the name {name}, and so would their results")
+    terminal.make_folder(output)
+    results: list[Result] = []
+    for folder, name in zip(folders, names, strict=True):
+        target = output / name
+        terminal.make_folder(target)
+        with (
+            terminal.progress(f"{name}, bytes") as progress,
+            terminal.usage_errors(),
+            terminal.writing(target),
+        ):
+            try:
+                result = run_replay(
+                    folder, settings, filter_name=filter_name, folder=target, progress=progress
+                )
+            except FilterError as error:
+                terminal.fail(f"{name}: {error}", ExitCode.FAILED)
+        results.append(result)
+        with terminal.writing(target):
+            write_results(target, result)
+        if result.interrupted:
+            break
+    interrupted = results[-1].interrupted
+    document = {
+        "command": "replay",
+        "version": version(),
+        "logs": [result.document() for result in results],
+    }
+    terminal.result_json(document)
+    for result in results:
+        _show(terminal, result, output / result.name)
+    if interrupted:
+        terminal.fail(
+            f"interrupted in {results[-1].name}: what was done is written to {output}",
+            ExitCode.INTERRUPTED,
+        )
+
+
+def write_results(folder: Path, result: Result) -> None:
+    """Write results.json, the figure and the report."""
+    from auvest import plots  # here, because matplotlib takes long to import
+    from auvest.replay import figures, report
+
+    (folder / "results.json").write_text(
+        console.to_json(result.document()) + "\n", encoding="utf-8"
+    )
+    plots.save(figures.overview(result), folder / "figure.png")
+    (folder / "report.html").write_text(report.html(result), encoding="utf-8")
+
+
+def _show(terminal: Terminal, result: Result, folder: Path) -> None:
+    from auvest.replay import report
+
+    table = Table(
+        title=f"{result.name}, {result.filter_name}", title_justify="left", title_style="bold"
+    )
+    table.add_column("quantity")
+    table.add_column("value", justify="right")
+    for row in report.rows(result):
+        table.add_row(*row)
+    terminal.result(table)
+    terminal.result(f"report    {folder / 'report.html'}")
+    terminal.result(f"tables    {folder}: estimates, measurements, errors as .csv and .parquet")
+    terminal.result(f"track     {folder / 'trajectory.tum'}\n")
+    for warning in report.warnings(result):
+        terminal.warn(f"{result.name}: {warning}")

@@ -1,0 +1,75 @@
+"""What a log consists of: its files, their columns, and what a value of each can be.
+
+The limits are wide enough for any vehicle and narrow enough to catch the usual wrong units:
+degrees, milliseconds, millimetres.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+_TURN = 2 * math.pi + 1e-6
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column: its name with the unit, the limits of a value, and what lies behind a breach."""
+
+    name: str
+    low: float
+    high: float
+    suspicion: str = ""
+    integer: bool = False
+
+    @property
+    def expected(self) -> str:
+        """What a value must be, in words."""
+        kind = "an integer" if self.integer else "a number"
+        return f"{kind} from {self.low:.6g} to {self.high:.6g}"
+
+
+_COLUMNS = {
+    column.name: column
+    for column in (
+        Column("time_s", -1e11, 1e11, "milliseconds or nanoseconds?"),
+        Column("source", 0, 1e9, integer=True),
+        Column("forward_m", -1e4, 1e4, "millimetres?"),
+        Column("left_m", -1e4, 1e4, "millimetres?"),
+        Column("turn_rad", -_TURN, _TURN, "degrees?"),
+        Column("speed_m_s", -50, 50, "millimetres per second?"),
+        Column("yaw_rate_rad_s", -20, 20, "degrees per second?"),
+        Column("range_m", 0, 1e5, "millimetres, or a code for 'no echo'?"),
+        Column("bearing_rad", -_TURN, _TURN, "degrees?"),
+        Column("heading_rad", -_TURN, _TURN, "degrees?"),
+        Column("x_m", -1e7, 1e7, "millimetres?"),
+        Column("y_m", -1e7, 1e7, "millimetres?"),
+        Column("sigma_m", 0, 1e4, "millimetres?"),
+    )
+}
+
+
+def _layout(*names: str) -> tuple[Column, ...]:
+    return tuple(_COLUMNS[name] for name in names)
+
+
+#: The files of a log and the columns each may have; one of the layouts, in any order of columns.
+FILES: Mapping[str, tuple[tuple[Column, ...], ...]] = {
+    "odometry.csv": (
+        _layout("time_s", "forward_m", "left_m", "turn_rad"),
+        _layout("time_s", "speed_m_s", "yaw_rate_rad_s"),
+    ),
+    "ranges.csv": (_layout("time_s", "source", "range_m"),),
+    "fixes.csv": (_layout("time_s", "source", "range_m", "bearing_rad"),),
+    "beacons.csv": (_layout("source", "x_m", "y_m"),),
+    "leaders.csv": (
+        _layout("time_s", "source", "x_m", "y_m"),
+        _layout("time_s", "source", "x_m", "y_m", "sigma_m"),
+    ),
+    "start.csv": (_layout("time_s", "x_m", "y_m", "heading_rad"),),
+    "truth.csv": (
+        _layout("time_s", "x_m", "y_m"),
+        _layout("time_s", "x_m", "y_m", "heading_rad"),
+    ),
+}

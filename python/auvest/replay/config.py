@@ -1,0 +1,201 @@
+"""Settings of a replay: what each section of the TOML file may say, with defaults and checks."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any, Literal, TypeAlias, get_args, get_type_hints
+
+from auvest._arguments import Bound, as_number
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+FilterName: TypeAlias = Literal["ekf", "robust-ekf", "ukf", "robust-ukf", "aukf"]
+KernelName: TypeAlias = Literal["huber", "hampel", "igg"]
+PolicyName: TypeAlias = Literal["fixed", "covariance-budget", "mahalanobis"]
+
+_PACKAGED = Path(__file__).parent / "configs"
+
+
+def _number(default: float, bound: Bound = "not negative") -> Any:
+    return field(default=default, metadata={"bound": bound})
+
+
+@dataclass(frozen=True, kw_only=True)
+class FilterSettings:
+    """The filter: ``kernel``, ``rejections`` and ``residual`` are those of robust-ekf."""
+
+    kind: FilterName | None = None  # None: robust-ekf for ranges, ukf for fixes
+    kernel: KernelName = "hampel"  # with the thresholds that are its defaults
+    alpha: float = _number(1e-3, "positive")
+
+
+@dataclass(frozen=True, kw_only=True)
+class StartSettings:
+    """Standard deviations of the belief that the run starts with."""
+
+    sigma_position_m: float = _number(1.0, "positive")
+    sigma_heading_rad: float = _number(0.1, "positive")
+    sigma_speed_m_s: float = _number(0.5, "positive")
+    sigma_acceleration_m_s2: float = _number(0.1, "positive")
+
+
+@dataclass(frozen=True, kw_only=True)
+class OdometrySettings:
+    """Noise of the odometry, and its calibration: factors on speed and turn, then an offset."""
+
+    sigma_distance: float = _number(0.05)  # of the distance of one increment
+    sigma_drift: float = _number(0.1)  # m/sqrt(s)
+    sigma_turn: float = _number(0.001)  # rad/sqrt(s)
+    speed_factor: float = _number(1.0, "positive")
+    turn_factor: float = _number(1.0, "positive")
+    turn_offset_rad_s: float = _number(0.0, "any")
+    max_step_s: float = _number(0.1, "positive")  # of velocity odometry
+
+
+@dataclass(frozen=True, kw_only=True)
+class RangeSettings:
+    """Ranges: noise, and the least time between two of one source that are used."""
+
+    sigma_m: float = _number(1.0, "positive")
+    every_s: float = _number(0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FixSettings:
+    """Fixes by range and bearing: noise, and the least time between two that are used."""
+
+    sigma_range_m: float = _number(0.1, "positive")
+    sigma_bearing_rad: float = _number(0.02, "positive")
+    near_field: float = _number(5.0)
+    every_s: float = _number(0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProcessSettings:
+    """Driving noise of the tracked craft's motion, as of :class:`auvest.ConstantAcceleration`."""
+
+    position_psd: float = _number(0.0)
+    velocity_psd: float = _number(1e-2)
+    acceleration_psd: float = _number(1e-6)
+
+
+@dataclass(frozen=True, kw_only=True)
+class IntervalSettings:
+    """When aukf wants its next fix."""
+
+    policy: PolicyName = "covariance-budget"
+    interval_s: float = _number(5.0, "positive")  # of fixed
+    min_s: float = _number(0.5, "positive")
+    max_s: float = _number(10.0, "positive")
+    position_sigma_m: float = _number(0.5, "positive")  # of covariance-budget
+
+
+@dataclass(frozen=True, kw_only=True)
+class LogSettings:
+    """Window for late lines, and the longest gap in a leader's track that a line bridges."""
+
+    late_s: float = _number(0.0)
+    leader_gap_s: float = _number(1.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """All sections."""
+
+    filter: FilterSettings = FilterSettings()
+    start: StartSettings = StartSettings()
+    odometry: OdometrySettings = OdometrySettings()
+    ranges: RangeSettings = RangeSettings()
+    fixes: FixSettings = FixSettings()
+    process: ProcessSettings = ProcessSettings()
+    interval: IntervalSettings = IntervalSettings()
+    log: LogSettings = LogSettings()
+
+
+def packaged_settings() -> tuple[str, ...]:
+    """Names of the settings that come with the package, one per validation set."""
+    return tuple(sorted(path.stem for path in _PACKAGED.glob("*.toml")))
+
+
+def find_settings(name: str) -> Settings:
+    """Read settings from a file, or those that come with the package, by name.
+
+    Raises
+    ------
+    ValueError
+        As :func:`read_settings`.
+    """
+    packaged = name in packaged_settings() and not Path(name).exists()
+    return read_settings(_PACKAGED / f"{name}.toml" if packaged else Path(name))
+
+
+def read_settings(path: Path) -> Settings:
+    """Read a TOML file; a section or a key that is left out has its default.
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read, is not TOML, or says something that is not known or out of
+        range; the message names file, section and key.
+    """
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be read: {error.strerror or error}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: is not TOML: {error}") from None
+    return settings_from(document, str(path))
+
+
+def settings_from(document: dict[str, Any], source: str = "settings") -> Settings:
+    """Build settings from nested dicts; ``source`` is named in messages.
+
+    Raises
+    ------
+    ValueError
+        As :func:`read_settings`.
+    """
+    sections = get_type_hints(Settings)
+    _refuse_unknown(document, sections, source)
+    chosen = {}
+    for name, values in document.items():
+        where = f"{source}: [{name}]"
+        if not isinstance(values, dict):
+            raise ValueError(f"{where} must be a section")
+        chosen[name] = _section(sections[name], values, where)
+    return Settings(**chosen)
+
+
+def _section(kind: type[Any], values: dict[str, Any], where: str) -> Any:
+    known = {entry.name: entry for entry in fields(kind)}
+    _refuse_unknown(values, known, where)
+    types = get_type_hints(kind)
+    checked: dict[str, Any] = {}
+    for key, value in values.items():
+        if "bound" in known[key].metadata:
+            try:
+                checked[key] = as_number(key, value, known[key].metadata["bound"])
+            except (ValueError, TypeError) as error:
+                raise ValueError(f"{where} {error}") from None
+        else:
+            checked[key] = _choice(types[key], value, f"{where} {key}")
+    return kind(**checked)
+
+
+def _choice(kind: Any, value: object, where: str) -> object:
+    options = [name for part in (kind, *get_args(kind)) for name in get_args(part)]
+    names = [name for name in options if isinstance(name, str)] or list(get_args(kind))
+    if value not in names:
+        raise ValueError(f"{where} must be one of {', '.join(map(repr, names))}, not {value!r}")
+    return value
+
+
+def _refuse_unknown(values: dict[str, Any], known: Any, where: str) -> None:
+    for key in values:
+        if key not in known:
+            raise ValueError(f"{where} has no {key!r}; known are {', '.join(known)}")

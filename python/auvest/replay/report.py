@@ -1,0 +1,142 @@
+"""One HTML file with everything about a replay: no network, no script, pictures inside."""
+
+from __future__ import annotations
+
+import base64
+import io
+from html import escape
+from typing import Any
+
+from matplotlib import rc_context
+
+from auvest.replay import tables
+from auvest.replay.figures import figures
+from auvest.replay.run import Result
+
+# The policy lets the page load nothing but the pictures that are in it.
+_PAGE = """<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy"
+ content="default-src 'none'; img-src data:; style-src 'unsafe-inline'">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}</title>
+<style>
+body {{ font: 16px/1.5 system-ui, sans-serif; color: #222; max-width: 60rem; margin: 2rem auto;
+       padding: 0 1rem; }}
+h1 {{ font-size: 1.5rem; }} h2 {{ font-size: 1.15rem; margin-top: 2rem; }}
+table {{ border-collapse: collapse; }}
+td, th {{ padding: 0.2rem 0.9rem 0.2rem 0; text-align: left; border-bottom: 1px solid #ddd; }}
+td.number {{ text-align: right; font-variant-numeric: tabular-nums; }}
+img {{ max-width: 100%; height: auto; }}
+.warning {{ background: #fff3cd; padding: 0.5rem 0.8rem; }}
+</style>
+</head>
+<body>
+<h1>{title}</h1>
+{warnings}
+<h2>Figures of the run</h2>
+{numbers}
+{pictures}
+<h2>Settings</h2>
+{settings}
+</body>
+</html>
+"""
+
+
+def html(result: Result) -> str:
+    """Make the page of a replay."""
+    pictures = "\n".join(
+        f'<h2>{escape(title)}</h2>\n<img alt="{escape(title)}" src="{_svg(figure)}">'
+        for title, figure in figures(result).items()
+    )
+    settings = [
+        (f"[{section}] {key}", str(value))
+        for section, values in result.document()["settings"].items()
+        for key, value in values.items()
+        if value is not None
+    ]
+    return _PAGE.format(
+        title=escape(f"{result.name}: replay with {result.filter_name}"),
+        warnings="\n".join(f'<p class="warning">{escape(text)}</p>' for text in warnings(result)),
+        numbers=_table(rows(result)),
+        pictures=pictures,
+        settings=_table(settings),
+    )
+
+
+def warnings(result: Result) -> list[str]:
+    """Say what of the log was not used, and why."""
+    found = ["The run was interrupted; this is what was done until then."] * result.interrupted
+    for name, late in result.numbers["late"].items():
+        if late["dropped"]:
+            lines = ", ".join(map(str, late["lines"]))
+            more = " ..." if late["dropped"] > len(late["lines"]) else ""
+            found.append(
+                f"{name}: {late['dropped']} not used, later than the window of "
+                f"{result.settings.log.late_s:g} s allows (line {lines}{more})."
+            )
+    reasons = {
+        tables.BEFORE_START: "taken before the start of the run",
+        tables.AFTER_END: "taken after the last line of the odometry",
+        tables.NO_POSITION: "the position of the source is not known at that time",
+    }
+    for outcome, reason in reasons.items():
+        count = result.numbers[outcome.replace(" ", "_")]
+        if count:
+            found.append(f"Measurements: {count} not used, {reason}.")
+    return found
+
+
+def rows(result: Result) -> list[tuple[str, str]]:
+    """Give the figures of the run, in words and with units, for tables."""
+    n = result.numbers
+    made = [
+        ("time", f"{n['first_s']:.1f} to {n['last_s']:.1f} s"),
+        ("measurements", f"{n['measurements']}"),
+        *((outcome, f"{n[outcome.replace(' ', '_')]}") for outcome in tables.OUTCOMES[:4]),
+        ("recoveries from lock-out", f"{n['recovered']}"),
+        ("taken as positions (near field)", f"{n['near_field']}"),
+        ("late lines put in order", f"{sum(f['reordered'] for f in n['late'].values())}"),
+        ("late lines not used", f"{sum(f['dropped'] for f in n['late'].values())}"),
+        ("position RMSE", _metres(n["rmse_m"])),
+        ("largest error", _metres(n["max_error_m"])),
+        ("dead reckoning alone, RMSE", _metres(n["dead_reckoned_rmse_m"])),
+        ("truth within 3 sigma", _share(n["inside_3_sigma"])),
+        ("held-out measurements, RMSE", _metres(n["held_out_rmse_m"])),
+        ("NIS, mean", _nis(n)),
+    ]
+    return [(name, text) for name, text in made if text]
+
+
+def _metres(value: float | None) -> str:
+    return "" if value is None else f"{value:.3f} m"
+
+
+def _share(value: float | None) -> str:
+    return "" if value is None else f"{100 * value:.1f} %"
+
+
+def _nis(numbers: dict[str, Any]) -> str:
+    if numbers["nis_mean"] is None:
+        return ""
+    low, high = numbers["nis_bounds_95"]
+    return f"{numbers['nis_mean']:.3f} (consistent: {low:.3f} to {high:.3f})"
+
+
+def _table(lines: list[tuple[str, str]]) -> str:
+    cells = (
+        f'<tr><th>{escape(name)}</th><td class="number">{escape(text)}</td></tr>'
+        for name, text in lines
+    )
+    return "<table>\n" + "\n".join(cells) + "\n</table>"
+
+
+def _svg(figure: Any) -> str:
+    buffer = io.StringIO()
+    with rc_context({"svg.hashsalt": "auvest"}):
+        figure.savefig(buffer, format="svg", metadata={"Date": None})
+    data = base64.b64encode(buffer.getvalue().encode()).decode()
+    return f"data:image/svg+xml;base64,{data}"

@@ -1,0 +1,53 @@
+"""What a replay produces, as columns: estimates, measurements and, with a truth, errors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+Columns: TypeAlias = Mapping[str, npt.NDArray[Any]]
+
+ACCEPTED, DOWNWEIGHTED, REJECTED = "accepted", "downweighted", "rejected"
+HELD_OUT = "held out"
+BEFORE_START, AFTER_END, NO_POSITION = "before start", "after end", "no position"
+#: By the number of auvest.Decision.
+DECISIONS = np.array([ACCEPTED, DOWNWEIGHTED, REJECTED])
+#: What can become of a measurement, in the order of reports.
+OUTCOMES = (ACCEPTED, DOWNWEIGHTED, REJECTED, HELD_OUT, BEFORE_START, AFTER_END, NO_POSITION)
+
+ESTIMATES = (
+    "time_s", "x_m", "y_m", "heading_rad", "var_x_m2", "cov_xy_m2", "var_y_m2",
+    "dead_reckoned_x_m", "dead_reckoned_y_m",
+)  # fmt: skip
+#: Innovation and weight per number measured; near_field: the innovation is a position error.
+MEASUREMENTS = (
+    "time_s", "source", "outcome", "innovation_0", "innovation_1", "sigma_0", "sigma_1",
+    "near_field", "nis", "weight_0", "weight_1", "recovered", "held_out_error_m",
+)  # fmt: skip
+ERRORS = (
+    "time_s", "true_x_m", "true_y_m", "error_x_m", "error_y_m", "sigma_x_m", "sigma_y_m",
+    "dead_reckoned_error_m",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Batch:
+    """What a stretch of the log gave; each a mapping of the names above to columns."""
+
+    estimates: Columns
+    measurements: Columns
+    errors: Columns
+
+
+def blank_measurements(rows: int) -> dict[str, npt.NDArray[Any]]:
+    """Make columns for so many measurements, nothing known of them yet."""
+    columns: dict[str, npt.NDArray[Any]] = {name: np.full(rows, np.nan) for name in MEASUREMENTS}
+    columns["source"] = np.zeros(rows, np.int64)
+    columns["outcome"] = np.full(rows, "", dtype="U12")
+    columns["near_field"] = np.zeros(rows, bool)
+    columns["recovered"] = np.zeros(rows, bool)
+    return columns

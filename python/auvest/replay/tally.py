@@ -1,0 +1,91 @@
+"""The figures of a replay, gathered as it goes: errors, consistency, what became of what."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from auvest.metrics import chi2_bounds
+from auvest.replay import tables
+from auvest.replay.tables import Batch
+
+
+class Tally:
+    """Sums over the batches of one replay."""
+
+    def __init__(self) -> None:
+        self.outcomes = dict.fromkeys(tables.OUTCOMES, 0)
+        self.recovered = 0
+        self.near_field = 0
+        self.estimates = 0
+        self.first_s = math.nan
+        self.last_s = math.nan
+        self._truth = 0
+        self._square = 0.0
+        self._reckoned_square = 0.0
+        self._worst = 0.0
+        self._inside = 0
+        self._held = 0
+        self._held_square = 0.0
+        self._nis = 0.0
+        self._nis_count = 0
+        self._numbers = 1
+
+    def add(self, batch: Batch) -> None:
+        """Take one batch."""
+        measured, errors = batch.measurements, batch.errors
+        names, counts = np.unique(measured["outcome"], return_counts=True)
+        for name, count in zip(names.tolist(), counts.tolist(), strict=True):
+            self.outcomes[name] += count
+        self.recovered += int(measured["recovered"].sum())
+        self.near_field += int(measured["near_field"].sum())
+        nis = measured["nis"][~np.isnan(measured["nis"])]
+        self._nis += float(nis.sum())
+        self._nis_count += len(nis)
+        if (~np.isnan(measured["innovation_1"])).any():
+            self._numbers = 2
+        held = measured["held_out_error_m"]
+        held = held[~np.isnan(held)]
+        self._held += len(held)
+        self._held_square += float(np.square(held).sum())
+
+        times = batch.estimates["time_s"]
+        self.estimates += len(times)
+        if len(times):
+            self.first_s = float(times[0]) if math.isnan(self.first_s) else self.first_s
+            self.last_s = float(times[-1])
+        x, y = errors["error_x_m"], errors["error_y_m"]
+        square = x * x + y * y
+        self._truth += len(x)
+        self._square += float(square.sum())
+        self._worst = max(self._worst, math.sqrt(float(square.max(initial=0.0))))
+        self._reckoned_square += float(np.square(errors["dead_reckoned_error_m"]).sum())
+        inside = (np.abs(x) <= 3 * errors["sigma_x_m"]) & (np.abs(y) <= 3 * errors["sigma_y_m"])
+        self._inside += int(inside.sum())
+
+    def numbers(self) -> dict[str, Any]:
+        """All figures by name; None where there is nothing to compute one from."""
+        bounds = chi2_bounds(self._numbers, self._nis_count) if self._nis_count else (None, None)
+        return {
+            "first_s": self.first_s,
+            "last_s": self.last_s,
+            "estimates": self.estimates,
+            "measurements": sum(self.outcomes.values()),
+            **{name.replace(" ", "_"): count for name, count in self.outcomes.items()},
+            "recovered": self.recovered,
+            "near_field": self.near_field,
+            "rmse_m": self._root(self._square, self._truth),
+            "max_error_m": self._worst if self._truth else None,
+            "dead_reckoned_rmse_m": self._root(self._reckoned_square, self._truth),
+            "inside_3_sigma": self._inside / self._truth if self._truth else None,
+            "truth": self._truth,
+            "held_out_rmse_m": self._root(self._held_square, self._held),
+            "nis_mean": self._nis / self._nis_count if self._nis_count else None,
+            "nis_bounds_95": list(bounds),
+        }
+
+    @staticmethod
+    def _root(square: float, count: int) -> float | None:
+        return math.sqrt(square / count) if count and math.isfinite(square) else None
