@@ -1,8 +1,10 @@
-"""The text that the sketch ``tracking_loop`` and its sonar speak over a serial line.
+"""The text that the sketches and their instruments speak over a serial line.
 
 Every line is ``$body*hh``; ``hh`` is the exclusive or of the characters of the body, as in
-NMEA 0183. The sketch asks its sonar with ``PING,sample``, is answered with
+NMEA 0183. A sketch asks its sonar with ``PING,sample``, is answered with
 ``SONAR,sample,range,bearing`` and reports each sample as ``AUV,...``; a comment names the columns.
+The sketch ``slave_tracking`` also asks with ``ODO,sample`` for ``MOTION,sample,speed,heading``, and
+reports as ``SLAVE,...``.
 """
 
 from __future__ import annotations
@@ -19,7 +21,9 @@ Row = dict[str, float]
 _COLUMNS = "# columns: "
 _BITS = re.compile(r"[0-9a-f]{8}")
 #: Columns that are always decimal: eight digits there are not the bits of a float.
-_DECIMAL = frozenset({"sample", "time_s", "status", "missed", "refused", "late", "awake_us"})
+_DECIMAL = frozenset(
+    {"sample", "time_s", "resamplings", "status", "missed", "refused", "late", "awake_us"}
+)
 
 
 class LineError(ValueError):
@@ -48,12 +52,12 @@ def body_of(line: str) -> str:
     return body
 
 
-def requested_sample(line: str) -> int | None:
-    """Give the number of the sample that the sketch asks its sonar for; None for other lines."""
-    if not line.startswith("$PING,"):
+def requested_sample(line: str, request: str = "PING") -> int | None:
+    """Give the number of the sample that a sketch asks for, its sonar as a rule; else None."""
+    if not line.startswith(f"${request},"):
         return None
     try:
-        return int(body_of(line).removeprefix("PING,"))
+        return int(body_of(line).removeprefix(f"{request},"))
     except ValueError:
         return None
 
@@ -64,7 +68,12 @@ def answer(sample: int, range_m: float, bearing_rad: float) -> str:
 
 
 class Reader:
-    """Reads what the sketch sends, line by line.
+    """Reads what a sketch sends, line by line.
+
+    Parameters
+    ----------
+    kind : str
+        With what its samples begin: ``AUV`` of ``tracking_loop``, ``SLAVE`` of ``slave_tracking``.
 
     Attributes
     ----------
@@ -72,7 +81,8 @@ class Reader:
         Names with units; empty until the comment that names them has come.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, kind: str = "AUV") -> None:
+        self._kind = kind
         self.columns: tuple[str, ...] = ()
 
     def read(self, line: str) -> Row | None:
@@ -94,7 +104,7 @@ class Reader:
         if not line or line.startswith("#"):
             return None
         kind, *cells = body_of(line).split(",")
-        if kind != "AUV":
+        if kind != self._kind:
             return None
         if not self.columns:
             raise LineError("the names of the columns have not come: reset the board")

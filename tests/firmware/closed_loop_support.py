@@ -5,8 +5,8 @@ A test file takes the fixtures with ``pytest_plugins = ["closed_loop_support"]``
 
 import contextlib
 import math
-import shutil
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 import pytest
@@ -46,30 +46,9 @@ class Run:
 
 
 @pytest.fixture(scope="session")
-def build_loop(build_sketch, root, tmp_path_factory):
-    """Return a function that compiles tracking_loop, edited as a user would.
-
-    ``settings`` are those of config.h; ``edits`` are files, a text in each and its replacement.
-    """
-
-    def build_loop(edits=(), **settings):
-        folder = tmp_path_factory.mktemp("loop") / "tracking_loop"
-        shutil.copytree(root / "firmware/library/examples/tracking_loop", folder)
-        config = (folder / "config.h").read_text()
-        for old, new in settings.items():
-            assert config.count(f" {old} = ") == 1, f"config.h has one setting {old}"
-            before, _, rest = config.partition(f" {old} = ")
-            config = f"{before} {old} = {new};{rest.partition(';')[2]}"
-        (folder / "config.h").write_text(config)
-        for file, old, new in edits:
-            source = (folder / file).read_text()
-            assert source.count(old) == 1, f"{file} has {old!r} once"
-            (folder / file).write_text(source.replace(old, new))
-        compiled = build_sketch(folder)
-        # The next sketch of this name takes its place.
-        return replace(compiled, elf=shutil.copy(compiled.elf, folder / "tracking_loop.elf"))
-
-    return build_loop
+def build_loop(build_edited):
+    """Return a function that compiles tracking_loop, edited as a user would."""
+    return partial(build_edited, "tracking_loop")
 
 
 @pytest.fixture

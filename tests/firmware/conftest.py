@@ -2,6 +2,7 @@
 
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -51,6 +52,33 @@ def build_sketch(library, tmp_path_factory):
         return sketch.compile_sketch(folder, library, output, define=define, **options)
 
     return build_sketch
+
+
+@pytest.fixture(scope="session")
+def build_edited(build_sketch, root, tmp_path_factory):
+    """Return a function that compiles an example, edited as a user would.
+
+    ``settings`` are those of its config.h; ``edits`` are files, a text in each and its replacement.
+    """
+
+    def build_edited(name, edits=(), **settings):
+        folder = tmp_path_factory.mktemp("edited") / name
+        shutil.copytree(root / "firmware/library/examples" / name, folder)
+        config = (folder / "config.h").read_text()
+        for old, new in settings.items():
+            assert config.count(f" {old} = ") == 1, f"config.h has one setting {old}"
+            before, _, rest = config.partition(f" {old} = ")
+            config = f"{before} {old} = {new};{rest.partition(';')[2]}"
+        (folder / "config.h").write_text(config)
+        for file, old, new in edits:
+            source = (folder / file).read_text()
+            assert source.count(old) == 1, f"{file} has {old!r} once"
+            (folder / file).write_text(source.replace(old, new))
+        compiled = build_sketch(folder)
+        # The next sketch of this name takes its place.
+        return replace(compiled, elf=shutil.copy(compiled.elf, folder / f"{name}.elf"))
+
+    return build_edited
 
 
 @pytest.fixture

@@ -127,9 +127,13 @@ def test_late_samples_are_counted_and_start_anew(play, loops, on_the_desk):
 
 def test_the_clock_wraps_unnoticed(play, build_loop, on_the_desk):
     """Ticks wrap after 4.8 hours; here the clock starts so that they do after 9 s."""
-    start = 0xFFDC
+    start, clock = 0xFFDC, "wake_timer::overflows"
     edits = [
-        ("wake_timer.h", "overflows = 0;", f"overflows = {start};"),
+        (
+            "tracking_loop.ino",
+            "begin();\n  deadline",
+            f"begin();\n  {clock} = {start};\n  deadline",
+        ),
         ("tracking_loop.ino", "moment = 0;", f"moment = {start}ul << 16;"),
     ]
     run = play(build_loop(edits).elf, noisy_sonar(), samples=40)

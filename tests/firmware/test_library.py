@@ -238,14 +238,17 @@ def test_keywords_are_the_public_types(keywords, folder):
     """Types in namespace auvest, of the headers that a user names types from."""
     public = set()
     for path in (folder / "src" / "auvest").rglob("*.hpp"):
-        if path.parent.name in {"scenarios", "math"} and path.name != "random.hpp":
+        named = {"random.hpp", "resampling.hpp"}
+        if path.parent.name in {"scenarios", "math", "particles"} and path.name not in named:
             continue
         text = re.sub(r"namespace detail \{.*?\n\}  // namespace detail", "", path.read_text(),
                       flags=re.DOTALL)  # fmt: skip
         public |= set(re.findall(r"^(?:class|struct|enum class|using) (\w+)(?![\w<;])", text,
                                  re.MULTILINE))  # fmt: skip
     types = {name for name, kind in keywords.items() if kind == "KEYWORD1"}
-    internal = {"GaussianFilter", "SigmaPoints", "SquareRootUpdate"}
+    internal = {"GaussianFilter", "SigmaPoints", "SquareRootUpdate", "Posterior"}
+    internal |= {"JointGaussian", "MeasurementProposal", "MotionProposal", "Place", "Score"}
+    internal |= {"ChosenModel", "Echo", "MasterBank"}
     assert types == public - internal
 
 

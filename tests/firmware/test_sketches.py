@@ -15,7 +15,7 @@ from firmware.sketch import SketchError
 pytest_plugins = ["board_support"]
 
 EXAMPLES = "firmware/library/examples"
-SKETCHES = ["first_steps", "replay", "tracking_loop"]
+SKETCHES = ["first_steps", "replay", "slave_tracking", "tracking_loop"]
 
 
 @pytest.fixture(scope="session")
@@ -128,7 +128,9 @@ def test_record_is_the_simulations(root):
 
 
 CLOCK = """
-#include "wake_timer.h"
+#include <auvest_wake_timer.h>
+
+namespace wake_timer = auvest_board::wake_timer;
 
 void setup() {
   Serial.begin(115200);
@@ -151,12 +153,8 @@ void loop() {}
 """
 
 
-def test_clock_goes_forwards_while_its_overflow_waits(build_sketch, root, text, tmp_path):
-    folder = tmp_path / "clock"
-    folder.mkdir()
-    shutil.copy(root / EXAMPLES / "tracking_loop" / "wake_timer.h", folder)
-    (folder / "clock.ino").write_text(CLOCK)
-    lines, _ = text(build_sketch(folder).elf, 0.5)
+def test_clock_goes_forwards_while_its_overflow_waits(build_sketch, text):
+    lines, _ = text(build_sketch(CLOCK).elf, 0.5)
     assert lines == ["forwards"]
 
 

@@ -5,10 +5,12 @@
 
 #include <Arduino.h>
 #include <auvest.h>
+#include <auvest_text_line.h>
+#include <auvest_wake_timer.h>
 
 #include "config.h"
-#include "text_line.h"
-#include "wake_timer.h"
+
+namespace wake_timer = auvest_board::wake_timer;
 
 /// What a sample was besides the state of the filter. Counters run from the start.
 struct Sample {
@@ -33,7 +35,7 @@ class Telemetry {
   static constexpr size_t kCapacity = 80 + kNumbers * (kExactText ? 9 : 14);
 
  public:
-  using Line = LineOut<kCapacity>;
+  using Line = auvest_board::LineOut<kCapacity>;
 
   /// Names the columns; to be sent once, before the first line.
   static void introduce() {

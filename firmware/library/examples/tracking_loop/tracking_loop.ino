@@ -20,11 +20,11 @@
 #include <Arduino.h>
 #include <auvest.h>
 #include <auvest_board.h>
+#include <auvest_wake_timer.h>
 
 #include "config.h"
 #include "sonar.h"
 #include "telemetry.h"
-#include "wake_timer.h"
 
 using Filter = auvest::Aukf<Process, IntervalPolicy>;
 
@@ -78,7 +78,7 @@ void note(auvest::Status status) {
 }
 
 void setup() {
-  Serial.begin(kBaud);
+  Serial.begin(auvest_board::kBaud);
   sonar.begin();
   Telemetry::introduce();
   const auvest::Status status = start_filter();

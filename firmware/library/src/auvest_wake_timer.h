@@ -1,4 +1,5 @@
-// A clock on Timer1, and a sleep that ends when something is ready (Arduino MEGA2560).
+// A clock on Timer1, and a sleep that ends when something is ready (Arduino MEGA2560). It takes
+// Timer1's interrupts: include it in one file of a sketch.
 //
 // One tick is 4 us at 16 MHz. A moment is a number of ticks in 32 bits, which wrap after 4.8 hours:
 // differences of moments stay right below half of that.
@@ -7,6 +8,7 @@
 #include <Arduino.h>
 #include <avr/sleep.h>
 
+namespace auvest_board {
 namespace wake_timer {
 
 constexpr uint32_t kTicksPerSecond = F_CPU / 64;
@@ -21,9 +23,6 @@ constexpr float to_seconds(uint32_t ticks) {
 
 static volatile uint16_t overflows = 0;
 static uint32_t asleep = 0;  ///< ticks; the interrupts that end a sleep count as sleep
-
-ISR(TIMER1_OVF_vect) { overflows = overflows + 1; }
-EMPTY_INTERRUPT(TIMER1_COMPA_vect)  // its only work is to wake the chip
 
 /// Starts at 0. Stops millis() and delay(), whose interrupt would wake the chip each millisecond.
 inline void begin() {
@@ -115,3 +114,10 @@ inline void sleep_until_moment(uint32_t moment) {
 }
 
 }  // namespace wake_timer
+}  // namespace auvest_board
+
+ISR(TIMER1_OVF_vect) {
+  using auvest_board::wake_timer::overflows;
+  overflows = overflows + 1;
+}
+EMPTY_INTERRUPT(TIMER1_COMPA_vect)  // its only work is to wake the chip

@@ -5,7 +5,9 @@
 #include <Arduino.h>
 #include <string.h>
 
-#include "wake_timer.h"
+#include "auvest_wake_timer.h"
+
+namespace auvest_board {
 
 constexpr uint32_t kBaud = 115200;
 
@@ -134,3 +136,5 @@ class LineIn {
   char text_[kCapacity];
   uint8_t size_ = 0;
 };
+
+}  // namespace auvest_board

@@ -1,0 +1,49 @@
+// The settings of this sketch: the scenario of the SLATF paper, section 7, noise level 3.
+#pragma once
+
+#include <auvest.h>
+
+/// How the slave moves: by the speed of its log and the heading of its compass.
+using Motion = auvest::CompassMotion<float>;
+
+/// How the master moves, but for what it has planned (master_plan.h).
+using Master = auvest::PiecewiseAcceleration<float>;
+
+/// Slatf2 draws the slave's poses with the echo in view. Slatf1 draws them blindly: it takes less
+/// RAM and is worse where the sonar is precise.
+using Filter = auvest::Slatf2<Motion, Master, 1>;
+
+/// Particles. They come in blocks of 16: 48 is what the MEGA2560 holds.
+constexpr int kParticles = 48;
+
+/// Another seed, other random numbers. Fixed: a run can be repeated on the desk, to the bit.
+constexpr uint32_t kSeed = 1;
+
+/// Standard deviations: of the readings (m/s, rad), of the echoes (m, rad).
+constexpr float kSigmaSpeed = 2;
+constexpr float kSigmaHeading = 0.3f;
+constexpr float kSigmaRange = 1;
+constexpr float kSigmaBearing = 0.06f;
+
+/// Seconds between two readings, and readings per ping.
+constexpr float kPeriod = 1;
+constexpr uint32_t kReadingsPerPing = 2;
+
+/// What is taken for a reading until the first one comes: m/s, rad.
+constexpr float kCruiseSpeed = 5.1444f;
+constexpr float kCruiseHeading = 0.5235988f;
+
+constexpr uint8_t kTriggerPin = 8;
+
+/// From the moment of the sample to the last character of the answer, s. Sound needs 0.6 s for
+/// 450 m and back.
+constexpr float kReadingTimeout = 0.1f;
+constexpr float kEchoTimeout = 0.6f;
+
+/// Floats are sent as their bits, 8 hexadecimal digits. false: with 3 decimals, to be read in the
+/// Serial Monitor.
+constexpr bool kExactText = true;
+
+/// RAM that is kept for the stack and for what Arduino itself takes, bytes. The sketch prints what
+/// it has left unused.
+constexpr size_t kStackReserve = 1280;

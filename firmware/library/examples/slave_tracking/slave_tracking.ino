@@ -1,0 +1,161 @@
+// A slave that lost communication keeps track of itself and of its master: SLATF (Lu, Chen, Liu,
+// Ma, He 2020) on an Arduino MEGA2560.
+//
+// Each second: the timer wakes the chip, it asks for speed and heading, all particles are moved.
+// Every other second it pings the master: the sonar is triggered at the moment of the sample, the
+// particles are moved while sound and answer are on their way, then the echo is taken in. One line
+// of text, and sleep until the next second.
+//
+//     chip to log and compass   $ODO,17*hh
+//     log and compass to chip   $MOTION,17,5.08,0.5301*hh     sample, speed [m/s], heading [rad]
+//     chip to sonar             $PING,18*hh
+//     sonar to chip             $SONAR,18,301.2,-1.5640*hh    sample, range [m], bearing [rad]
+//
+// The bearing is the paper's: from the x axis, from the master to the slave.
+//
+// Moments add up, so they do not drift. If the chip is still busy more than 1 ms after a deadline,
+// the sample is taken at once and counted as late; the prediction covers the time that really
+// passed. A reading that does not come is replaced by the last one, an echo by nothing; both are
+// counted as missed.
+//
+// Text, 115200 baud: $SLAVE,...*hh; a comment at the start names its columns. The estimates are
+// computed after pings only. Now and then a comment says how much RAM was never used.
+#include <Arduino.h>
+#include <auvest.h>
+#include <auvest_board.h>
+#include <auvest_instruments.h>
+#include <auvest_wake_timer.h>
+
+#include "config.h"
+#include "master_plan.h"
+#include "telemetry.h"
+
+constexpr uint32_t kTicks = wake_timer::to_ticks(kPeriod);
+constexpr uint32_t kTolerance = wake_timer::to_ticks(0.001f);
+constexpr uint32_t kPause = wake_timer::to_ticks(0.05f);  // enough to look at the RAM
+
+Motion::Params readings_noise() {
+  Motion::Params params;
+  params.sigma_speed_mps = kSigmaSpeed;
+  params.sigma_heading_rad = kSigmaHeading;
+  return params;
+}
+
+auvest::Sonar<float>::Params echo_noise() {
+  auvest::Sonar<float>::Params params;
+  params.sigma_range_m = kSigmaRange;
+  params.sigma_bearing_rad = kSigmaBearing;
+  return params;
+}
+
+// All objects are global: what they take is known before the sketch runs.
+Filter::Storage<kParticles> particles;
+Filter filter(Motion(readings_noise()), Master(), Filter::Params(), particles);
+auvest::math::Random random_numbers(kSeed);
+const auvest::Sonar<float> sonar(echo_noise());
+const MasterPlan plan;
+auvest_board::SerialInstruments instruments;
+Telemetry telemetry;
+Sample sample;
+uint32_t moment = 0;         // of this sample, ticks
+uint32_t deadline = kTicks;  // of the next one, ticks
+
+static_assert(auvest_board::fits(sizeof particles + sizeof filter + sizeof random_numbers +
+                                     sizeof sonar + sizeof plan + sizeof instruments +
+                                     sizeof telemetry + sizeof sample,
+                                 kStackReserve),
+              "the objects of this sketch leave less than kStackReserve bytes of RAM to the stack");
+
+// The functions are not inlined: what one needs on the stack must not lie there for another.
+
+// Communication has just broken: the slave is where it was told, at (0, 0).
+AUVEST_OUTLINE auvest::Status start_filter() {
+  Filter::SlaveBelief slave;
+  auvest::math::set_zero(slave.x);
+  auvest::math::set_zero(slave.P);
+  const auvest::Status status = filter.reset(slave, random_numbers);
+  return status == auvest::Status::kOk ? filter.add_master(plan.start()) : status;
+}
+
+// Of several results of a sample, the first that is not kOk is told.
+void note(auvest::Status status) {
+  if (sample.status == auvest::Status::kOk) sample.status = status;
+}
+
+AUVEST_OUTLINE void predict(float from_s, float to_s) {
+  const Filter::VelocityChange change = plan.change(from_s, to_s);
+  note(filter.predict(sample.dt, sample.u, random_numbers, &change));
+}
+
+AUVEST_OUTLINE void update() {
+  const auvest::Sighting<float> echo = {sample.z, 0};
+  note(filter.update(&echo, 1, sonar, random_numbers));
+}
+
+AUVEST_OUTLINE void report() {
+  sample.refused = instruments.refused();
+  sample.awake = wake_timer::take_awake();
+  telemetry.line().send();  // what is left of the one before
+  telemetry.write(sample, filter);
+  if (!wake_timer::reached(deadline - telemetry.line().duration())) telemetry.line().send();
+  if (sample.number % 60 == 0 && !wake_timer::reached(deadline - kPause)) {
+    Telemetry::remark_ram(auvest_board::ram_unused());
+  }
+}
+
+void pulse() {
+  digitalWrite(kTriggerPin, HIGH);
+  delayMicroseconds(10);
+  digitalWrite(kTriggerPin, LOW);
+}
+
+void setup() {
+  Serial.begin(auvest_board::kBaud);
+  pinMode(kTriggerPin, OUTPUT);
+  digitalWrite(kTriggerPin, LOW);
+  Telemetry::introduce();
+  sample.u(0) = kCruiseSpeed;
+  sample.u(1) = kCruiseHeading;
+  const auvest::Status status = start_filter();
+  if (status != auvest::Status::kOk) {
+    Serial.print(F("# the filter does not start, status "));  // its text would take 300 B of RAM
+    Serial.println(static_cast<uint8_t>(status));
+    for (;;) {
+    }
+  }
+  wake_timer::begin();
+}
+
+void loop() {
+  // The moment of this sample.
+  wake_timer::sleep_until_moment(deadline);
+  const uint32_t now = wake_timer::now();
+  const bool late = now - deadline > kTolerance;
+  const uint32_t previous = moment;
+  moment = late ? now : deadline;
+  deadline = moment + kTicks;
+  sample.pinged = ++sample.number % kReadingsPerPing == 0;
+  if (sample.pinged) pulse();
+  instruments.begin(sample.number);
+  instruments.ask("ODO");
+  sample.read = instruments.await("MOTION", moment + wake_timer::to_ticks(kReadingTimeout),
+                                  sample.u, telemetry.line());
+  if (sample.pinged) instruments.ask("PING");
+
+  // The filter.
+  sample.status = auvest::Status::kOk;
+  const float from_s = sample.time.in_seconds();
+  sample.time.add(moment - previous);
+  sample.dt = late ? wake_timer::to_seconds(moment - previous) : kPeriod;
+  predict(from_s, sample.time.in_seconds());
+  sample.heard =
+      sample.pinged && instruments.await("SONAR", moment + wake_timer::to_ticks(kEchoTimeout),
+                                         sample.z, telemetry.line());
+  if (sample.heard) update();
+
+  // The line.
+  if (!sample.read) ++sample.missed;
+  if (sample.pinged && !sample.heard) ++sample.missed;
+  if (late) ++sample.late;
+  report();
+}
