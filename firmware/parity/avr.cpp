@@ -1,7 +1,7 @@
 // The replay on an ATmega2560: the board's input stream gives the record, its output stream takes
 // the trace.
 #include "board.hpp"
-#include "replay.hpp"
+#include AUVEST_REPLAY
 
 namespace {
 

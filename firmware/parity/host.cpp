@@ -2,7 +2,7 @@
 // source too: newlib reaches the files through semihosting.
 #include <cstdio>
 
-#include "replay.hpp"
+#include AUVEST_REPLAY
 
 namespace {
 

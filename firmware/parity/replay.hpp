@@ -8,7 +8,8 @@
 //             then per step: flags, dt, z, reference
 //     trace:  status of reset, then per step: x, P, interval, innovation, S, nis, statuses
 //
-// A record of kind kSelfTest has no more words; its trace is what auvest::self_test() reports.
+// A record of kind kSelfTest has no more words; its trace is what auvest::self_test() reports. One
+// of kind kRobust goes on as replay_robust.hpp says.
 #pragma once
 
 #include "any_interval.hpp"
@@ -19,11 +20,12 @@
 #include "auvest/models/range_bearing.hpp"
 #include "auvest/self_test.hpp"
 #include "params.hpp"
+#include "replay_robust.hpp"
 
 namespace auvest {
 namespace parity {
 
-enum Kind : std::uint32_t { kEkfEuler, kEkfExact, kUkfEuler, kUkfExact, kSelfTest };
+enum Kind : std::uint32_t { kEkfEuler, kEkfExact, kUkfEuler, kUkfExact, kSelfTest, kRobust = 16 };
 
 // Flags of a step; what is not asked for is left out.
 const std::uint32_t kGivenInterval = 1;  // predict(dt), not predict(interval())
@@ -43,6 +45,10 @@ class Replay {
       const SelfTestResult result = self_test();
       stream_.write(static_cast<std::uint32_t>(result.failed));
       stream_.write(result.index);
+      return;
+    }
+    if (kind == kRobust) {
+      RobustReplay<Stream>(stream_).run();
       return;
     }
     steps_ = stream_.read();

@@ -1,13 +1,14 @@
 """The targets on which a record is replayed: how the program is built and how it is run.
 
-Each target compiles one of the ``main`` functions beside this file around ``replay.hpp``.
+Each target compiles one of the ``main`` functions beside this file around ``replay.hpp`` or
+``slatf_replay.hpp``.
 """
 
 from __future__ import annotations
 
 import shutil
 import subprocess
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -52,6 +53,8 @@ class Target:
         The computer itself, the simulated ATmega2560 board or a board of QEMU.
     library : tuple of Path
         What the Arduino library compiles beside the headers.
+    header : str
+        What is replayed: ``replay.hpp`` or ``slatf_replay.hpp``.
     """
 
     name: str
@@ -59,6 +62,7 @@ class Target:
     flags: tuple[str, ...]
     machine: Literal["host", "avr", "mps2-an385", "mps2-an386"]
     library: tuple[Path, ...] = ()
+    header: str = "replay.hpp"
 
     @property
     def sources(self) -> tuple[Path, ...]:
@@ -78,7 +82,7 @@ class Target:
             If the compiler is missing or fails.
         """
         require(self.compiler)
-        own = [f"-I{ROOT / 'cpp/bindings'}"]
+        own = [f"-I{ROOT / 'cpp/bindings'}", f'-DAUVEST_REPLAY="{self.header}"']
         if self.machine == "avr":
             own += [f"-I{ROOT / 'firmware/board'}", f"-I{ROOT / 'firmware/avr_std'}"]
         # Before the library's own path: what is in `extra` is found first.
@@ -173,4 +177,30 @@ TARGETS = (
     _avr("atmega2560-O2", "-O2"),
     _cortex("cortex-m4f", "mps2-an386", "-mcpu=cortex-m4", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"),
     _cortex("cortex-m3", "mps2-an385", "-mcpu=cortex-m3"),
+)
+
+
+# ---- SLATF ---------------------------------------------------------------------------------------
+
+#: Particles of the paper; and what the RAM of the ATmega2560 holds beside the stack: whole blocks
+#: of 16 (auvest/particles/lanes.hpp).
+PARTICLES, AVR_PARTICLES = 100, 48
+
+
+def _slatf(target: Target, name: str = "", *flags: str) -> Target:
+    capacity = AVR_PARTICLES if target.machine == "avr" else PARTICLES
+    flags = (*target.flags, f"-DAUVEST_PARTICLES={capacity}", *flags)
+    return replace(target, name=target.name + name, flags=flags, header="slatf_replay.hpp")
+
+
+#: The same for SLATF; on the host also in lanes: of SSE2, and of the widest set that there is.
+#: (gcc's lanes against its scalar code: tests/cpp/simd.)
+SLATF_TARGETS = (
+    *map(_slatf, TARGETS),
+    *(
+        _slatf(target, f"-{lanes}", f"-DAUVEST_LANES={lanes}")
+        for target in TARGETS
+        if target.name == "clang-O3-march=native"
+        for lanes in ("sse2", "default_arch")
+    ),
 )

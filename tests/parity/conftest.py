@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import shlex
 
 import numpy as np
@@ -13,26 +14,46 @@ from tests.parity.python_leg import replay_in_python
 
 
 @pytest.fixture(scope="session")
-def replay(tmp_path_factory, request):
-    """Return a function that replays a record, given as bytes, on a target.
+def build(tmp_path_factory):
+    """Return a function that builds a target's replay program, each once, and gives its path.
 
     ``extra`` are further flags and sources of the program.
     """
-    folder = tmp_path_factory.mktemp("replay")
+    folder = tmp_path_factory.mktemp("programs")
+    names = itertools.count()
     programs = {}
 
+    def build(target, *extra):
+        key = target, extra
+        if key not in programs:
+            try:
+                programs[key] = target.build(folder / str(next(names)), *extra)
+            except ReplayError as error:
+                _fail(target, extra, error)
+        return programs[key]
+
+    return build
+
+
+@pytest.fixture(scope="session")
+def replay(build, tmp_path_factory, request):
+    """Return a function that replays a record, given as bytes, on a target."""
+    folder = tmp_path_factory.mktemp("replay")
+
     def replay(target, record, *extra):
-        key = target.name, extra
         board = request.getfixturevalue("runner") if target.machine == "avr" else None
+        program = build(target, *extra)
+        (folder / "record").write_bytes(record)
         try:
-            if key not in programs:
-                programs[key] = target.build(folder / str(len(programs)), *extra)
-            (folder / "record").write_bytes(record)
-            return target.replay(programs[key], folder / "record", folder / "trace", board)
+            return target.replay(program, folder / "record", folder / "trace", board)
         except ReplayError as error:
-            pytest.fail(f"{target.name} {shlex.join(map(str, extra))}: {error}", pytrace=False)
+            _fail(target, extra, error)
 
     return replay
+
+
+def _fail(target, extra, error):
+    pytest.fail(f"{target.name} {shlex.join(map(str, extra))}: {error}", pytrace=False)
 
 
 @pytest.fixture(scope="session")

@@ -1,0 +1,123 @@
+// The replay of a robust EKF: speed and heading or odometry, ranges to leaders. As replay.hpp, with
+// records of its own kind:
+//
+//     record: process, steps, kernel, its three thresholds, post-fit?, rejections (0: no recovery),
+//             process parameters, sensor (leader left out), x0, P0,
+//             then per step: flags, dt, input, z, leader
+//     trace:  status of reset, then per step: x, P, innovation, S, nis, standardised, weight,
+//             variance asked for by the recovery, two words of counts and statuses
+#pragma once
+
+#include "any_kernel.hpp"
+#include "any_recovery.hpp"
+#include "auvest/filters/ekf.hpp"
+#include "auvest/filters/robust.hpp"
+#include "auvest/models/leader_range.hpp"
+#include "auvest/models/odometry.hpp"
+#include "auvest/models/speed_heading.hpp"
+#include "params.hpp"
+
+namespace auvest {
+namespace parity {
+
+template <class Stream>
+class RobustReplay {
+ public:
+  explicit RobustReplay(Stream& stream) : stream_(stream) {}
+
+  void run() {
+    enum Kind : std::uint32_t { kSpeedHeading, kSpeedHeadingBiasScale, kOdometry };
+    const std::uint32_t process = stream_.read();
+    steps_ = stream_.read();
+    read_rule();
+    if (process == kSpeedHeading) replay<SpeedHeading<float>>();
+    if (process == kSpeedHeadingBiasScale) replay<SpeedHeading<float, true, true>>();
+    if (process == kOdometry) replay<Odometry<float>>();
+  }
+
+ private:
+  using Rule = RobustUpdate<AnyKernel<float>, AnyRecovery<float>>;
+
+  void read_rule() {
+    const auto kind = static_cast<AnyKernel<float>::Kind>(stream_.read());
+    float threshold[3];
+    for (float& value : threshold) value = read();
+    AnyKernel<float>& kernel = rule_.kernel;
+    kernel.kind = kind;
+    kernel.huber.params.k = threshold[0];
+    kernel.igg.params.k0 = threshold[0];
+    kernel.igg.params.k1 = threshold[1];
+    kernel.hampel.params.a = threshold[0];
+    kernel.hampel.params.b = threshold[1];
+    kernel.hampel.params.c = threshold[2];
+    const bool post_fit = stream_.read() != 0;
+    rule_.params.residual = post_fit ? Residual::kPostFit : Residual::kInnovation;
+    const std::uint32_t rejections = stream_.read();
+    rule_.recovery.enabled = rejections > 0;
+    if (rejections > 0) {
+      rule_.recovery.streak.params.rejections = static_cast<std::uint8_t>(rejections);
+    }
+  }
+
+  template <class Process>
+  void replay() {
+    using Filter = Robust<Ekf<Process>, Rule>;
+    typename Process::Params params;
+    visit(params, [this](const char*, float& value) { value = read(); });
+    LeaderRange<float, Process::kStates> sensor;
+    sensor.params.sigma_range_m = read();
+    sensor.params.sigma_leader_m = read();
+    Filter filter{Ekf<Process>(Process(params)), rule_};
+    typename Filter::State x0;
+    typename Filter::Covariance p0;
+    p0.setZero();
+    for (int i = 0; i < Process::kStates; ++i) x0(i) = read();
+    for (int i = 0; i < Process::kStates; ++i) {
+      for (int j = 0; j <= i; ++j) p0(i, j) = read();
+    }
+    stream_.write(static_cast<std::uint32_t>(filter.reset(x0, p0)));
+    for (std::uint32_t k = 0; k < steps_; ++k) step(filter, sensor);
+  }
+
+  template <class Filter, class Sensor>
+  void step(Filter& filter, Sensor& sensor) {
+    const bool measured = stream_.read() != 0;
+    const float dt = read();
+    Vector<float, 3> input;
+    for (int i = 0; i < 3; ++i) input(i) = read();
+    Vector<float, 1> z;
+    z(0) = read();
+    sensor.params.leader_x_m = read();
+    sensor.params.leader_y_m = read();
+
+    const Status predicted = filter.predict(dt, input);
+    RobustCorrection<float, 1> u(Status::kOk);
+    if (measured) u = filter.update(z, sensor);
+
+    for (int i = 0; i < Filter::kStates; ++i) write(filter.x()(i));
+    for (int i = 0; i < Filter::kStates; ++i) {
+      for (int j = 0; j <= i; ++j) write(filter.belief().P(i, j));
+    }
+    write(u.innovation(0));
+    write(u.S(0, 0));
+    write(u.nis);
+    write(u.standardised(0));
+    write(u.weight(0));
+    const RejectionStreak<float>& streak = filter.rule().recovery.streak;
+    write(streak.variance);
+    stream_.write(
+        static_cast<std::uint32_t>(u.decision) | static_cast<std::uint32_t>(u.iterations) << 8 |
+        static_cast<std::uint32_t>(predicted) << 16 | static_cast<std::uint32_t>(u.status) << 24);
+    stream_.write((u.recovered ? 1u : 0u) | static_cast<std::uint32_t>(streak.count) << 8);
+  }
+
+  float read() { return math::from_bits(stream_.read()); }
+  void write(float value) { stream_.write(math::to_bits(value)); }
+
+  Stream& stream_;
+  std::uint32_t steps_ = 0;
+  Rule rule_;
+};
+
+}  // namespace parity
+}  // namespace auvest
