@@ -24,9 +24,12 @@ import numpy as np
 
 from auvest import telemetry
 from auvest.board import Board, BoardError, SerialLine
+from auvest.scenarios import cooperative
 from auvest.scenarios.paper_aukf import FilterName, paper_filter, paper_noise
 from auvest.scenarios.tracking import Scenario, Track, simulate
 from firmware.package import PackageError, package
+from firmware.parity.slatf import FIELDS, paper_world
+from firmware.parity.targets import AVR_PARTICLES
 from firmware.sketch import Compiled, SketchError, compile_sketch
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -41,6 +44,11 @@ TOLERANCE = 0.02
 
 #: Steps that each filter is measured over. The vehicle reaches every bearing and the near field.
 STEPS = {"ekf": 1_000, "ukf": 1_000, "aukf": 10_000, "aukf_covariance_budget": 1_000}
+STEPS.update(robust_ekf_predict=1_000, robust_ekf_update=1_000)
+
+#: Echoes that SLATF is measured over, and the seconds between two of them.
+ECHOES = 25
+SONAR_PERIOD_S = 2.0
 
 COLUMNS = (
     "target",
@@ -99,10 +107,10 @@ using Process = auvest::EulerAcceleration<float>;
 using Filter = @FILTER@;
 static_assert(sizeof(Filter) <= 320, "more RAM than promised");
 
-auvest::Ukf<Process> make_ukf() {
-  auvest::Ukf<Process>::Params points = auvest::Ukf<Process>::default_params();
-  points.alpha = 1e-6f;
-  return auvest::Ukf<Process>(Process(), points);
+auvest::Ukf<Process>::Params points() {
+  auvest::Ukf<Process>::Params params = auvest::Ukf<Process>::default_params();
+  params.alpha = 1e-6f;
+  return params;
 }
 
 Filter filter{@MAKE@};
@@ -118,7 +126,7 @@ auvest::Status step(const auvest::Vector<float, 2>& z, const auvest::Vector<floa
   @STEP@
 }
 
-// Inlined into main(), as setup() is, this frame would stay on the stack for good.
+// Inlined into main(), as setup() and loop() are, these frames would lie below one another.
 __attribute__((noinline)) void start() {
   Filter::State x;
   Filter::Covariance P;
@@ -128,21 +136,21 @@ __attribute__((noinline)) void start() {
   if (filter.reset(x, P) != auvest::Status::kOk) board::fail();
 }
 
-void setup() { start(); }
-
-void loop() {
+__attribute__((noinline)) void sample() {
   auvest::Vector<float, 2> z;
   auvest::Vector<float, 2> desired;
-  z(0) = next();
-  z(1) = next();
-  desired(0) = next();
-  desired(1) = next();
+  for (uint8_t i = 0; i < 2; ++i) z(i) = next();
+  for (uint8_t i = 0; i < 2; ++i) desired(i) = next();
   if (auvest::math::is_nan(z(0))) board::finish();
   board::begin(1);
   const auvest::Status status = step(z, desired);
   board::end(1);
   if (status != auvest::Status::kOk) board::fail();
 }
+
+void setup() { start(); }
+
+void loop() { sample(); }
 """
 
 _FIXED_STEP = """auvest::Status status = filter.predict(0.5f);
@@ -153,26 +161,186 @@ _ADAPTIVE_STEP = """auvest::Status status = filter.predict(filter.interval());
   if (status == auvest::Status::kOk) status = filter.feedback(desired);
   return status;"""
 
+# The same for ranges to leaders, with dead reckoning between them.
+_RANGE_FILTER = """\
+#include <auvest.h>
+
+#include "board.hpp"
+
+using Process = auvest::SpeedHeading<float>;
+using Filter = auvest::RobustEkf<Process>;
+static_assert(sizeof(Filter) <= 100, "more RAM than promised");
+
+Filter filter{auvest::Ekf<Process>(Process())};
+
+float next() {
+  uint32_t bits = 0;
+  for (uint8_t i = 0; i < 4; ++i) bits = bits >> 8 | static_cast<uint32_t>(board::read()) << 24;
+  return auvest::math::from_bits(bits);
+}
+
+// Inlined into main(), as setup() is, this frame would stay on the stack for good.
+__attribute__((noinline)) void start() {
+  Filter::State x;
+  Filter::Covariance P;
+  auvest::math::set_zero(x);
+  auvest::math::set_zero(P);
+  P(0, 0) = P(1, 1) = next();
+  if (filter.reset(x, P) != auvest::Status::kOk) board::fail();
+}
+
+void setup() { start(); }
+
+void loop() {
+  auvest::Vector<float, 3> motion;
+  auvest::LeaderRange<float, 2> leader;
+  auvest::Vector<float, 1> z;
+  for (uint8_t i = 0; i < 3; ++i) motion(i) = next();
+  leader.params.leader_x_m = next();
+  leader.params.leader_y_m = next();
+  z(0) = next();
+  if (auvest::math::is_nan(z(0))) board::finish();
+  board::begin(@PREDICT@);
+  auvest::Status status = filter.predict(5.0f, motion);
+  board::end(@PREDICT@);
+  if (status != auvest::Status::kOk) board::fail();
+  board::begin(@UPDATE@);
+  status = filter.update(z, leader).status;
+  board::end(@UPDATE@);
+  if (status != auvest::Status::kOk) board::fail();
+}
+"""
+
+#: The range filter's two programs: which section, of which 1 is reported, is predict and update.
+_RANGE_SECTIONS = {"robust_ekf_predict": (1, 2), "robust_ekf_update": (2, 1)}
+
 #: Program, type, constructor's argument and step of each filter.
 _FILTERS: Mapping[str, tuple[str, str, str]] = {
     "ekf": ("auvest::Ekf<Process>", "Process()", _FIXED_STEP),
-    "ukf": ("auvest::Ukf<Process>", "make_ukf()", _FIXED_STEP),
-    "aukf": ("auvest::Aukf<Process>", "make_ukf()", _ADAPTIVE_STEP),
+    "ukf": ("auvest::Ukf<Process>", "Process(), points()", _FIXED_STEP),
+    "aukf": ("auvest::Aukf<Process>", "Process(), points()", _ADAPTIVE_STEP),
     "aukf_covariance_budget": (
         "auvest::Aukf<Process, auvest::CovarianceBudget<float>>",
-        "make_ukf()",
+        "Process(), points()",
         _ADAPTIVE_STEP,
     ),
 }
 
 
+# SLATF at work: between two echoes there are two readings of the odometry.
+_SLATF = """\
+#include <auvest.h>
+
+#include "board.hpp"
+
+using Motion = auvest::CompassMotion<float>;
+using Master = auvest::PiecewiseAcceleration<float>;
+using Filter = auvest::@KIND@<Motion, Master, 1>;
+
+Filter::Storage<@PARTICLES@> particles;
+Filter filter(Motion(), Master(), Filter::Params(), particles);
+const auvest::Sonar<float> sonar;
+auvest::math::Random numbers(1);
+auvest::Status status = auvest::Status::kOk;
+
+// In a struct, where arduino-builder leaves them alone.
+struct Record {
+  static float next() {
+    uint32_t bits = 0;
+    for (uint8_t i = 0; i < 4; ++i) bits = bits >> 8 | static_cast<uint32_t>(board::read()) << 24;
+    return auvest::math::from_bits(bits);
+  }
+
+  static void read(auvest::Vector<float, 2>& vector) {
+    for (uint8_t i = 0; i < 2; ++i) vector(i) = next();
+  }
+
+  template <int Size>
+  static void read(auvest::Belief<float, Size>& belief) {
+    auvest::math::set_zero(belief.P);
+    for (uint8_t i = 0; i < Size; ++i) belief.x(i) = next();
+    for (uint8_t i = 0; i < Size; ++i) {
+      for (uint8_t j = 0; j <= i; ++j) belief.P(i, j) = next();
+    }
+  }
+};
+
+struct Reading {
+  float dt;
+  Filter::Control u;
+  Filter::VelocityChange change;
+  auvest::Sighting<float> echo;
+
+  void read() {
+    dt = Record::next();
+    Record::read(u);
+    Record::read(change);
+    Record::next();  // whether there is an echo: behind every other reading
+    Record::read(echo.z);
+    echo.master = 0;
+  }
+};
+
+void note(auvest::Status result) {
+  if (status == auvest::Status::kOk) status = result;
+}
+
+__attribute__((noinline)) void start() {
+  Filter::SlaveBelief slave;
+  Filter::MasterBelief master;
+  Record::read(slave);
+  Record::read(master);
+  note(filter.reset(slave, numbers));
+  note(filter.add_master(master));
+}
+
+__attribute__((noinline)) void step(const Reading (&readings)[2]) {
+  for (const Reading& reading : readings) {
+    note(filter.predict(reading.dt, reading.u, numbers, &reading.change));
+  }
+  note(filter.update(&readings[1].echo, 1, sonar, numbers));
+}
+
+void setup() { start(); }
+
+void loop() {
+  Reading readings[2];
+  for (Reading& reading : readings) reading.read();
+  if (auvest::math::is_nan(readings[0].dt)) board::finish();
+  board::begin(1);
+  step(readings);
+  board::end(1);
+  if (status != auvest::Status::kOk) board::fail();
+}
+"""
+
+_SLATFS = {"slatf1": "Slatf1", "slatf2": "Slatf2"}
+
+
 def _source(program: str) -> str:
+    if program in _SLATFS:
+        source = _SLATF.replace("@KIND@", _SLATFS[program])
+        return source.replace("@PARTICLES@", str(AVR_PARTICLES))
+    if program in _RANGE_SECTIONS:
+        predict, update = _RANGE_SECTIONS[program]
+        source = _RANGE_FILTER.replace("@PREDICT@", str(predict))
+        return source.replace("@UPDATE@", str(update))
     kind, make, step = _FILTERS[program]
     return _FILTER.replace("@FILTER@", kind).replace("@MAKE@", make).replace("@STEP@", step)
 
 
+def _slatf_record() -> bytes:
+    """Return the beginning of the paper's scenario."""
+    world = paper_world()
+    readings = world.readings[: 2 * ECHOES]
+    end = np.full(2 * readings.itemsize // 4, np.nan, "<f4")
+    return b"".join(part.tobytes() for part in (world.slave, world.master, readings, end))
+
+
 def _record(program: str) -> bytes:
     """Start, variances and the steps of a vehicle that circles through the station."""
+    if program in _RANGE_SECTIONS:
+        return _range_record(STEPS[program])
     names: Mapping[str, FilterName] = {"ekf": "ekf", "ukf": "ukf"}
     name = names.get(program, "aukf")
     filter_ = paper_filter(name, noise=paper_noise("normal"), track="turn", dtype="float32")
@@ -187,6 +355,23 @@ def _record(program: str) -> bytes:
     rows = np.hstack([result.z[0], result.truth[0]])
     end = np.full(4, np.nan)
     return np.concatenate([start, rows.ravel(), end]).astype("<f4").tobytes()
+
+
+def _range_record(steps: int) -> bytes:
+    """Variance and the steps of a slave among two leaders, one range of ten an outlier."""
+    rng = np.random.default_rng(1)
+    slave, leaders = cooperative.tracks(5 * steps)
+    slave, leaders = slave[4::5], leaders[4::5, :]
+    leader = leaders[np.arange(steps), np.arange(steps) % 2]
+    moved = np.diff(slave, axis=0, prepend=[[0.0, 0.0]]) / 5
+    motion = np.stack(
+        [np.hypot(*moved.T), np.zeros(steps), np.arctan2(moved[:, 1], moved[:, 0])], axis=1
+    )
+    motion += rng.standard_normal((steps, 3)) * [0.05, 0.0, 0.01]
+    z = np.hypot(*(slave - leader).T)
+    z += rng.standard_normal(steps) * np.where(rng.random(steps) < 0.1, 10.0, 1.0)
+    rows = np.column_stack([motion, leader, z])
+    return np.concatenate([[4.0], rows.ravel(), np.full(6, np.nan)]).astype("<f4").tobytes()
 
 
 # ---- Measure -------------------------------------------------------------------------------------
@@ -207,10 +392,12 @@ def measure(output: Path) -> list[Row]:
     """
     library = package(output)
     programs: dict[str, Callable[[Compiled, Path], Row]] = {"empty": _run_empty}
-    programs.update(dict.fromkeys(_FILTERS, _run_filter))
+    programs.update(dict.fromkeys([*_FILTERS, *_RANGE_SECTIONS], _run_filter))
+    programs.update(dict.fromkeys(_SLATFS, _run_slatf))
     programs["first_steps"] = _run_first_steps
     programs["replay"] = _run_replay
     programs["tracking_loop"] = _run_tracking_loop
+    programs["slave_tracking"] = _run_slave_tracking
     compiled = {}
     for program in programs:  # one after the other: they share Arduino's core
         folder = output / "sketches" / program
@@ -245,13 +432,21 @@ def _run_empty(compiled: Compiled, folder: Path) -> Row:
 
 
 def _run_filter(compiled: Compiled, folder: Path) -> Row:
+    return _run_record(compiled, folder, _record(folder.name), STEPS[folder.name])
+
+
+def _run_slatf(compiled: Compiled, folder: Path) -> Row:
+    return _run_record(compiled, folder, _slatf_record(), ECHOES)
+
+
+def _run_record(compiled: Compiled, folder: Path, words: bytes, steps: int) -> Row:
     record = folder / "record.bin"
-    record.write_bytes(_record(folder.name))
+    record.write_bytes(words)
     with Board(compiled.elf, input=record, limit_s=1000.0) as board:
         report = board.run()
     step = report.sections[1]
-    if step.count != STEPS[folder.name]:
-        raise BudgetError(f"{folder.name}: {step.count} steps instead of {STEPS[folder.name]}")
+    if step.count != steps:
+        raise BudgetError(f"{folder.name}: {step.count} steps instead of {steps}")
     cycles = [step.minimum, step.median, step.maximum]
     return _row(folder.name, compiled, report.stack_bytes, cycles)
 
@@ -289,6 +484,33 @@ def _run_tracking_loop(compiled: Compiled, folder: Path) -> Row:
                 board.send(telemetry.answer(sample, 5.0, 0.5), delay_s=0.01)
     cycles = [round(row["awake_us"] * 16) for row in rows]
     return _row(folder.name, compiled, board.report.stack_bytes, cycles)
+
+
+def _run_slave_tracking(compiled: Compiled, folder: Path) -> Row:
+    """Measure 20 pings of the paper's scenario: the cycles awake between two of them."""
+    reader = telemetry.Reader("SLAVE")
+    awake_us: list[float] = []
+    readings = paper_world().readings
+    with Board(compiled.elf, limit_s=120.0) as board:
+        for event in board:
+            if not isinstance(event, SerialLine):
+                continue
+            row = reader.read(event.text)
+            if row is not None:
+                awake_us.append(row["awake_us"])
+            if len(awake_us) == 41:
+                break
+            sample = telemetry.requested_sample(event.text, "ODO")
+            if sample is not None:
+                speed, heading = readings["u"][sample - 1]
+                answer = telemetry.frame(f"MOTION,{sample},{speed:.6f},{heading:.6f}")
+                board.send(answer, delay_s=0.005)
+            sample = telemetry.requested_sample(event.text)
+            if sample is not None:
+                board.send(telemetry.answer(sample, *readings["z"][sample - 1]), delay_s=0.4)
+    # The first sample counts the start too.
+    pairs = np.array(awake_us[1:]).reshape(-1, 2).sum(axis=1)
+    return _row(folder.name, compiled, board.report.stack_bytes, [round(16 * us) for us in pairs])
 
 
 # ---- Compare and write ---------------------------------------------------------------------------
@@ -367,10 +589,14 @@ def page(rows: list[Row]) -> str:
         "interval feedback (the paper's law; the covariance budget). Six states, float, the",
         f"paper's model, alpha = 1e-6, range and bearing, {STEPS['ekf']:,} steps (`aukf`:",
         f"{STEPS['aukf']:,}); the vehicle circles through the station, so the near field and every",
-        "bearing occur. The examples: `first_steps` is its",
-        "whole run, serial text included; `replay` counts predict, update and feedback by the",
-        "chip's timer; `tracking_loop` counts the cycles awake between two samples, serial text",
-        "included.",
+        "bearing occur. `robust_ekf_predict` and `robust_ekf_update`: dead reckoning by speed and",
+        "heading and one range, M-estimation EKF of two states with IGG and the recovery, a range",
+        "of ten an outlier; the same program, its two halves.",
+        f"`slatf1` and `slatf2`: N = {AVR_PARTICLES}, one master, two predictions and one echo,",
+        f"{ECHOES} times at the beginning of the paper's scenario. The examples: `first_steps` is",
+        "its whole run, serial text included; `replay` counts predict, update and feedback by the",
+        "chip's timer; `tracking_loop` counts the cycles awake between two samples,",
+        "`slave_tracking` those between two pings, serial text included.",
         "",
         "Flash and static RAM are what the IDE reports (bytes); the stack is the deepest of the",
         "whole run from the end of the RAM, interrupts included.",
@@ -394,7 +620,49 @@ def page(rows: list[Row]) -> str:
             "exact reduction of large angles. Bytes can be had for cycles; here the cycles were",
             "chosen.",
         ]
+    lines += slatf_page(rows)
     return "\n".join([*lines, ""])
+
+
+def slatf_page(rows: list[Row]) -> list[str]:
+    """Return the lines of the page on SLATF: cost per particle, and share of the sonar period."""
+    by_name = {row.program: row for row in rows}
+    lines = [
+        "",
+        "## What SLATF takes",
+        "",
+        f"The paper's sonar pings every {SONAR_PERIOD_S:g} s, with two readings of the odometry in",
+        "between. The cycles of one such step, divided by the particles; `slave_tracking` has its",
+        "serial line and both estimates beside them:",
+        "",
+        "| program | particles | cycles per particle and step | of the sonar period |",
+        "|---|---:|---:|---:|",
+    ]
+    for name in (*_SLATFS, "slave_tracking"):
+        cycles = by_name[name].cycles_median
+        if cycles is None:
+            raise BudgetError(f"{name} has no cycles")
+        share = cycles / (16e6 * SONAR_PERIOD_S)
+        lines.append(f"| `{name}` | {AVR_PARTICLES} | {cycles // AVR_PARTICLES:,} | {share:.1%} |")
+    slave = by_name["slave_tracking"]
+    asleep = 1 - awake_share(slave)
+    particles = 4 * FIELDS["slatf2"] * AVR_PARTICLES
+    return [
+        *lines,
+        "",
+        "Asked: 40 particles that meet the sonar period, with half of the time asleep. Measured,",
+        f"with {AVR_PARTICLES}: {asleep:.0%} asleep where it is least. Particles come in blocks of",
+        f"16: of the 8,192 B of RAM {AVR_PARTICLES} of SLATF 2.0 take {particles:,}, what else is",
+        f"static in the sketch {slave.static_ram_bytes - particles:,}, the stack "
+        f"{slave.stack_bytes:,}.",
+    ]
+
+
+def awake_share(slave_tracking: Row) -> float:
+    """Share of the sonar period that the sketch is awake, where it is largest."""
+    if slave_tracking.cycles_max is None:
+        raise BudgetError("slave_tracking has no cycles")
+    return slave_tracking.cycles_max / (16e6 * SONAR_PERIOD_S)
 
 
 @dataclass(frozen=True)

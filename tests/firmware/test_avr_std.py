@@ -201,10 +201,9 @@ def test_they_give_way_to_a_real_library(compile_cpp, compiler):
         compile_cpp(compiler, source, "-c", "-std=gnu++11", *STRICT, *OUR_PATHS)
 
 
-@pytest.mark.parametrize("option", ["-Os", "-O2"])
 @pytest.mark.parametrize("header", PUBLIC)
-def test_each_public_header_compiles_alone(compile_cpp, header, option):
-    compile_cpp("avr-g++", include(header, header), *AVR, option, *STRICT, *AUVEST_PATHS)
+def test_each_public_header_compiles_alone(compile_cpp, header):
+    compile_cpp("avr-g++", include(header, header), *AVR, "-Os", *STRICT, *AUVEST_PATHS)
 
 
 def test_what_is_not_there_does_not_link(compile_cpp):

@@ -32,13 +32,25 @@ def test_page_is_the_committed_tables():
 
 def test_every_filter_and_example_is_measured(rows, root):
     examples = {path.name for path in (root / "firmware/library/examples").iterdir()}
-    assert rows.keys() >= examples | {"empty", "ekf", "ukf", "aukf", "aukf_covariance_budget"}
+    filters = {"ekf", "ukf", "aukf", "aukf_covariance_budget", "slatf1", "slatf2"}
+    filters |= {"robust_ekf_predict", "robust_ekf_update"}
+    assert rows.keys() >= examples | filters | {"empty"}
 
 
 def test_aukf_does_what_the_design_asks_as_far_as_the_page_says(measured):
     """All but the flash, whose figure is on the page and may not grow."""
     not_met = [target.name for target in budgets.targets(measured) if not target.met]
     assert not_met == ["flash above the empty sketch, bytes"]
+
+
+def test_slatf_sleeps_half_of_the_sonar_period(rows):
+    assert budgets.AVR_PARTICLES >= 40
+    assert budgets.awake_share(rows["slave_tracking"]) < 0.5
+
+
+def test_a_range_takes_at_most_15_000_cycles(rows):
+    """The median; a range that is weighted down takes three divisions more."""
+    assert rows["robust_ekf_update"].cycles_median <= 15_000
 
 
 ROW = budgets.Row("atmega2560", "aukf", 10_000, 300, 400, 1_000, 2_000, 3_000)

@@ -100,7 +100,8 @@ def test_sizes_are_those_of_the_elf(aukf):
 
 def test_aukf_sketch(aukf, empty):
     assert 5_000 < aukf.flash - empty.flash < 20_000
-    assert aukf.ram - empty.ram < 400  # the filter, its model and policy, the sensor
+    # The filter, its model and policy, the sensor, and the constants that they start from.
+    assert aukf.ram - empty.ram < 450
     assert "warning" not in aukf.report.replace("warning: unused parameter ‘tag’", "")
 
 
