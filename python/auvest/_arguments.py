@@ -262,6 +262,11 @@ def processors() -> int:
     return min(256, os.cpu_count() or 1)
 
 
+def as_workers(workers: int | None) -> int:
+    """Return the number of threads: one per processor, unless it is given (1 to 256)."""
+    return processors() if workers is None else as_integer("workers", workers, 1, 256)
+
+
 class Exclusive:
     """Refuses the second thread that enters while the first is inside."""
 

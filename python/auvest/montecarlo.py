@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import shutil
 import zipfile
 from collections.abc import Callable, Mapping
@@ -21,7 +20,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from auvest._arguments import as_integer
+from auvest._arguments import as_integer, as_workers
 
 Columns: TypeAlias = dict[str, npt.NDArray[Any]]
 #: ``task(first, count)`` does the runs ``first .. first + count - 1``, without the GIL if it can.
@@ -44,11 +43,12 @@ class Interrupted(KeyboardInterrupt):
         self.partial = partial
 
 
-def processors() -> int:
-    """Processors that this process may use, at most 256."""
-    if hasattr(os, "sched_getaffinity"):
-        return min(256, len(os.sched_getaffinity(0)))
-    return min(256, os.cpu_count() or 1)
+def chunk_for(runs: int, rows: int, workers: int | None = None) -> int:
+    """Choose the runs per chunk, where each run has so many rows.
+
+    Small enough that progress is seen and that the last worker does not keep the others waiting.
+    """
+    return max(1, min(-(-runs // (4 * as_workers(workers))), 500_000 // rows))
 
 
 def run(
@@ -97,7 +97,7 @@ def run(
     """
     total = as_integer("runs", runs, 1, 2**53)
     size = as_integer("chunk", chunk, 1, 2**53)
-    threads = processors() if workers is None else as_integer("workers", workers, 1, 256)
+    threads = as_workers(workers)
     if progress is not None and not callable(progress):
         raise TypeError(f"progress must be callable, not {type(progress).__name__}")
     if store is not None and settings is None:

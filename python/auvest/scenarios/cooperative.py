@@ -8,14 +8,13 @@ this project's own reference case. The loop is C++
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from auvest import _core, metrics
+from auvest import _core, metrics, montecarlo
 from auvest._arguments import (
     as_flag,
     as_instance,
@@ -23,7 +22,6 @@ from auvest._arguments import (
     as_kind,
     as_number,
     as_pair,
-    processors,
 )
 from auvest._core import Status
 from auvest.kernels import Kernel, KernelName, RejectionStreak
@@ -319,41 +317,25 @@ def simulate(
         raise ValueError(f"filter must have a SpeedHeading of two states, not {filter.process}")
     if not isinstance(filter.measurement, LeaderRange):
         raise ValueError(f"filter must measure a LeaderRange, not {filter.measurement}")
-    threads = processors() if workers is None else as_integer("workers", workers, 1, 256)
-    if progress is not None and not callable(progress):
-        raise TypeError(f"progress must be callable, not {type(progress).__name__}")
     core = filter._prototype()
     sensor = core_sensor(filter.measurement, filter.dtype.name)
-    runs = scenario.runs
-    chunk = max(1, min(-(-runs // (4 * threads)), 500_000 // scenario.steps))
 
-    def part(first: int) -> dict[str, npt.NDArray[Any]]:
-        count = min(chunk, runs - first)
+    def part(first: int, count: int) -> dict[str, npt.NDArray[Any]]:
         return _core.cooperate(core, sensor, _as_core(scenario, first, count))
 
-    parts: dict[int, dict[str, npt.NDArray[Any]]] = {}
-    done = 0
-    with ThreadPoolExecutor(threads) as pool:
-        futures = {pool.submit(part, first): first for first in range(0, runs, chunk)}
-        try:
-            for future in as_completed(futures):
-                result = future.result()
-                parts[futures[future]] = result
-                done += len(result["samples"])
-                if progress is not None:
-                    progress(done, runs)
-        except BaseException as stop:
-            pool.shutdown(cancel_futures=True)
-            if isinstance(stop, KeyboardInterrupt) and parts:
-                stop.partial = _join(parts, scenario)  # type: ignore[attr-defined]
-            raise
-    return _join(parts, scenario)
-
-
-def _join(parts: dict[int, dict[str, npt.NDArray[Any]]], scenario: Scenario) -> Result:
-    ordered = [parts[first] for first in sorted(parts)]
-    arrays = {name: np.concatenate([p[name] for p in ordered]) for name in ordered[0]}
-    return Result(**arrays, scenario=scenario)
+    try:
+        columns = montecarlo.run(
+            part,
+            runs=scenario.runs,
+            chunk=montecarlo.chunk_for(scenario.runs, scenario.steps, workers),
+            workers=workers,
+            progress=progress,
+        )
+    except montecarlo.Interrupted as stop:
+        if stop.partial is not None:
+            stop.partial = Result(**stop.partial, scenario=scenario)
+        raise
+    return Result(**columns, scenario=scenario)
 
 
 def _as_core(scenario: Scenario, first: int, count: int) -> dict[str, Any]:
