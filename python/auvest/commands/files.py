@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy.typing as npt
+
+from auvest.commands import console
 
 
 def write_csv(path: Path, columns: Mapping[str, npt.NDArray[Any]]) -> Path:
@@ -20,3 +22,36 @@ def write_csv(path: Path, columns: Mapping[str, npt.NDArray[Any]]) -> Path:
 
 def _cell(value: Any) -> str:
     return "" if value != value else f"{value:.6g}"
+
+
+def write_page(
+    folder: Path,
+    document: Mapping[str, Any],
+    tables: Mapping[str, Mapping[str, npt.NDArray[Any]]],
+    page: str,
+    done: list[Path],
+) -> None:
+    """Write results.json, the CSV files and the page; ``done`` gets each path when it is there."""
+    path = folder / "results.json"
+    path.write_text(console.to_json(document) + "\n", encoding="utf-8")
+    done.append(path)
+    for stem, table in tables.items():
+        done.append(write_csv(folder / f"{stem}.csv", table))
+    path = folder / "README.md"
+    path.write_text(page, encoding="utf-8")
+    done.append(path)
+
+
+def save_figures(
+    folder: Path,
+    figures: Mapping[str, Callable[[Any], Any]],
+    result: Any,
+    progress: console.ProgressCallback,
+    done: list[Path],
+) -> None:
+    """Draw each figure of a result and write it as PNG under its name."""
+    from auvest import plots  # here, because matplotlib takes long to import
+
+    for number, (stem, draw) in enumerate(figures.items(), start=1):
+        done.append(plots.save(draw(result), folder / f"{stem}.png"))
+        progress(number, len(figures))

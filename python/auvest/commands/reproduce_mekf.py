@@ -10,7 +10,7 @@ from rich.table import Table
 
 from auvest.commands import console
 from auvest.commands.console import EXIT_CODES, ExitCode, Terminal
-from auvest.commands.files import write_csv
+from auvest.commands.files import save_figures, write_page
 from auvest.commands.version import version
 from auvest.reproduce import mekf, mekf_page
 
@@ -62,7 +62,7 @@ def command(
             "claims": [claim.as_dict() for claim in claims],
         }
         with terminal.writing(output):
-            write_results(output, result, document, done)
+            write_page(output, document, mekf.tables(result), mekf_page.page(result), done)
         with terminal.progress("figures") as progress, terminal.writing(output):
             draw_figures(output, result, progress, done)
     except KeyboardInterrupt:
@@ -79,20 +79,6 @@ def command(
         terminal.fail(f"{result.failed_runs} runs failed; numbers are missing", ExitCode.FAILED)
 
 
-def write_results(
-    folder: Path, result: mekf.Reproduction, document: dict[str, object], done: list[Path]
-) -> None:
-    """Write results.json, the CSV files and the page; ``done`` gets each path when it is there."""
-    path = folder / "results.json"
-    path.write_text(console.to_json(document) + "\n", encoding="utf-8")
-    done.append(path)
-    for stem, table in mekf.tables(result).items():
-        done.append(write_csv(folder / f"{stem}.csv", table))
-    path = folder / "README.md"
-    path.write_text(mekf_page.page(result), encoding="utf-8")
-    done.append(path)
-
-
 def draw_figures(
     folder: Path,
     result: mekf.Reproduction,
@@ -100,13 +86,9 @@ def draw_figures(
     done: list[Path],
 ) -> None:
     """Write the PNG files."""
-    from auvest import plots  # here, because matplotlib takes long to import
-    from auvest.reproduce import mekf_figures
+    from auvest.reproduce import mekf_figures  # here, because matplotlib takes long to import
 
-    total = len(mekf_figures.FIGURES)
-    for number, (stem, draw) in enumerate(mekf_figures.FIGURES.items(), start=1):
-        done.append(plots.save(draw(result), folder / f"{stem}.png"))
-        progress(number, total)
+    save_figures(folder, mekf_figures.FIGURES, result, progress, done)
 
 
 def _claims(claims: list[mekf_page.Claim]) -> Table:

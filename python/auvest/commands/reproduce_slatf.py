@@ -10,7 +10,7 @@ from rich.table import Table
 
 from auvest.commands import console
 from auvest.commands.console import EXIT_CODES, ExitCode, Terminal
-from auvest.commands.files import write_csv
+from auvest.commands.files import save_figures, write_page
 from auvest.commands.version import version
 from auvest.reproduce import slatf, slatf_page
 from auvest.scenarios.paper_aukf import DTypeName
@@ -74,7 +74,7 @@ def command(
             "claims": [claim.as_dict() for claim in slatf_page.claims(result)],
         }
         with terminal.writing(output):
-            write_results(output, result, document, done)
+            write_page(output, document, slatf.tables(result), slatf_page.page(result), done)
         with terminal.progress("figures") as progress, terminal.writing(output):
             draw_figures(output, result, progress, done)
     except KeyboardInterrupt:
@@ -90,20 +90,6 @@ def command(
         terminal.fail(f"{result.failed_runs} runs failed; numbers are missing", ExitCode.FAILED)
 
 
-def write_results(
-    folder: Path, result: slatf.Reproduction, document: dict[str, Any], done: list[Path]
-) -> None:
-    """Write results.json, the CSV files and the page; ``done`` gets each path when it is there."""
-    path = folder / "results.json"
-    path.write_text(console.to_json(document) + "\n", encoding="utf-8")
-    done.append(path)
-    for stem, table in slatf.tables(result).items():
-        done.append(write_csv(folder / f"{stem}.csv", table))
-    path = folder / "README.md"
-    path.write_text(slatf_page.page(result), encoding="utf-8")
-    done.append(path)
-
-
 def draw_figures(
     folder: Path,
     result: slatf.Reproduction,
@@ -111,13 +97,9 @@ def draw_figures(
     done: list[Path],
 ) -> None:
     """Write the PNG files."""
-    from auvest import plots  # here, because matplotlib takes long to import
-    from auvest.reproduce import slatf_figures
+    from auvest.reproduce import slatf_figures  # here, because matplotlib takes long to import
 
-    total = len(slatf_figures.FIGURES)
-    for number, (stem, draw) in enumerate(slatf_figures.FIGURES.items(), start=1):
-        done.append(plots.save(draw(result), folder / f"{stem}.png"))
-        progress(number, total)
+    save_figures(folder, slatf_figures.FIGURES, result, progress, done)
 
 
 #: Short, so that the table fits into 80 columns.
