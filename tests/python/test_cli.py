@@ -314,9 +314,10 @@ def test_interrupt_before_anything_is_done(tmp_path: Path, monkeypatch: pytest.M
 
 
 def interrupt_after(seconds: float, command: list[str], cwd: Path) -> tuple[int, str, str]:
-    """Run a command, interrupt it, and return its exit code, stdout and stderr."""
+    """Run a command, interrupt it at work, and return its exit code, stdout and stderr."""
+    output = cwd / f"after-{seconds}"
     program = subprocess.Popen(
-        command,
+        [*command, "--output", str(output)],
         cwd=cwd,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -324,16 +325,18 @@ def interrupt_after(seconds: float, command: list[str], cwd: Path) -> tuple[int,
         # A shell that runs the tests in the background has them ignore the signal.
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
+    while not output.exists() and program.poll() is None:  # made just before the work
+        time.sleep(0.1)
     time.sleep(seconds)
     program.send_signal(signal.SIGINT)
-    out, err = program.communicate(timeout=60)
+    out, err = program.communicate(timeout=120)
     return program.returncode, out, err
 
 
 def test_ctrl_c_keeps_the_runs_done(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "auvest", "simulate", "aukf", "--json", "--no-figure"]
     command += ["--runs", "90000", "--steps", "110", "--workers", "1"]
-    for seconds in (3, 15):  # a busy machine takes longer to start
+    for seconds in (1, 10, 40):  # a busy machine takes longer
         code, out, err = interrupt_after(seconds, command, tmp_path)
         if out:
             break

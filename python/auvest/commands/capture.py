@@ -16,11 +16,13 @@ from rich.table import Table
 
 from auvest import MahalanobisInterval, RangeBearing, metrics, telemetry
 from auvest.board import Board, BoardError, Finished, PinChange, SerialLine
-from auvest.commands import console
-from auvest.commands.console import EXIT_CODES, ExitCode, Terminal, refuse_given
+from auvest.commands import options
+from auvest.commands.console import EXIT_CODES, ExitCode, Terminal
+from auvest.commands.files import write_results
+from auvest.commands.options import WORLD, refuse_given
 from auvest.commands.version import version
 from auvest.scenarios import paper_aukf
-from auvest.scenarios.paper_aukf import NoiseKind, observed_positions
+from auvest.scenarios.paper_aukf import observed_positions
 from auvest.scenarios.tracking import Noise, Track
 from auvest.telemetry import LineError, Reader, Row
 
@@ -52,7 +54,6 @@ Examples:
 {EXIT_CODES}
 """
 
-_WORLD = "Simulated vehicle and sonar"
 _NOISE = paper_aukf.paper_noise()
 
 
@@ -243,51 +244,27 @@ def command(
     play_sonar: Annotated[
         bool,
         typer.Option(
-            "--play-sonar", help="Answer the board at --port as sonar.", rich_help_panel=_WORLD
+            "--play-sonar",
+            help="Answer the board at --port as sonar.",
+            rich_help_panel=WORLD,
         ),
     ] = False,
-    noise: Annotated[
-        NoiseKind,
-        typer.Option(
-            help="Kind of both noises: U(0,1), N(0,1) or exp(N(0,1)).", rich_help_panel=_WORLD
-        ),
-    ] = "normal",
-    range_noise: Annotated[
-        float,
-        typer.Option(
-            callback=console.positive, help="Scale of the range noise, m.", rich_help_panel=_WORLD
-        ),
-    ] = _NOISE.range_m,
-    bearing_noise: Annotated[
-        float,
-        typer.Option(
-            callback=console.positive,
-            help="Scale of the bearing noise, rad.",
-            rich_help_panel=_WORLD,
-        ),
-    ] = _NOISE.bearing_rad,
+    noise: options.Noise = "normal",
+    range_noise: options.RangeNoise = _NOISE.range_m,
+    bearing_noise: options.BearingNoise = _NOISE.bearing_rad,
     dropout: Annotated[
         float,
         typer.Option(
-            callback=console.fraction,
+            callback=options.fraction,
             help="Probability that an answer never comes.",
-            rich_help_panel=_WORLD,
+            rich_help_panel=WORLD,
         ),
     ] = 0.0,
-    seed: console.Seed = 1,
-    output: Annotated[
-        Path,
-        typer.Option(
-            file_okay=False,
-            help="Folder for CSV, figure and JSON; made if missing.",
-            rich_help_panel="Output",
-        ),
-    ] = Path("auvest-output/capture"),
-    no_figure: Annotated[
-        bool, typer.Option("--no-figure", help="Draw nothing.", rich_help_panel="Output")
-    ] = False,
-    as_json: console.Json = False,
-    quiet: console.Quiet = False,
+    seed: options.Seed = 1,
+    output: options.Output = Path("auvest-output/capture"),
+    no_figure: options.NoFigure = False,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """Record; the help text is :data:`HELP`."""
     terminal = Terminal(as_json=as_json, quiet=quiet)
@@ -354,21 +331,18 @@ def command(
     with terminal.writing(output):
         if not no_figure:
             files["figure"] = _draw(output / "figure.png", recording, sensor, settings["source"])
-        files["results"] = output / "results.json"
         document = {
             "command": "capture",
             "version": version(),
             "settings": settings,
             "complete": not (interrupted or trouble),
             "results": values,
-            "files": {name: str(file) for name, file in files.items()},
         }
-        files["results"].write_text(console.to_json(document) + "\n", encoding="utf-8")
+        write_results(output, document, files)
 
     terminal.result_json(document)
     terminal.result(_table(values, settings["source"]))
-    for name, file in files.items():
-        terminal.result(f"{name:9} {file}")
+    terminal.files(files)
     if trouble:
         terminal.fail(f"{trouble}; the samples until then are kept", ExitCode.FAILED)
     if interrupted:

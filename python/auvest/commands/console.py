@@ -1,4 +1,4 @@
-"""What all commands share: where output goes, exit codes, progress, checks of option values.
+"""What all commands share: where output goes, exit codes, progress.
 
 Results go to stdout, everything else to stderr. With ``--json`` stdout holds one JSON object and
 nothing else. ``--quiet`` leaves only errors on stderr.
@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from enum import IntEnum
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import Any, NoReturn
 
 import typer
 from rich.console import Console
@@ -56,6 +56,11 @@ class Terminal:
         """Print the one JSON object, if it was asked for."""
         if self.as_json:
             typer.echo(to_json(value))
+
+    def files(self, files: Mapping[str, Path]) -> None:
+        """Print for a human what was written."""
+        for name, path in files.items():
+            self.result(f"{name.replace('_', ' '):9} {path}")
 
     def warn(self, message: str) -> None:
         """Print one line on stderr, unless quiet."""
@@ -125,80 +130,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
-
-
-def refuse_given(ctx: typer.Context, names: tuple[str, ...], why: str) -> None:
-    """Refuse options that were given and would do nothing."""
-    for name in names:
-        source = ctx.get_parameter_source(name)
-        if source is not None and source.name != "DEFAULT":
-            raise typer.BadParameter(why, param_hint=f"'--{name.replace('_', '-')}'")
-
-
-def positive(value: float | None) -> float | None:
-    """Option callback: a finite number above zero."""
-    if value is not None and not (math.isfinite(value) and value > 0):
-        raise typer.BadParameter(f"{value} is not a finite number above 0.")
-    return value
-
-
-def not_negative(value: float) -> float:
-    """Option callback: a finite number of at least zero."""
-    if not (math.isfinite(value) and value >= 0):
-        raise typer.BadParameter(f"{value} is not a finite number of at least 0.")
-    return value
-
-
-def finite(value: float | None) -> float | None:
-    """Option callback: any finite number."""
-    if value is not None and not math.isfinite(value):
-        raise typer.BadParameter(f"{value} is not a finite number.")
-    return value
-
-
-def fraction(value: float | None) -> float | None:
-    """Option callback: a probability below one."""
-    if value is not None and not 0 <= value < 1:
-        raise typer.BadParameter(f"{value} is not a probability of at least 0 and below 1.")
-    return value
-
-
-def open_unit(value: float | None) -> float | None:
-    """Option callback: strictly between zero and one."""
-    if value is not None and not 0 < value < 1:
-        raise typer.BadParameter(f"{value} is not strictly between 0 and 1.")
-    return value
-
-
-# Options that mean the same in every command.
-_OUTPUT = "Output"
-Runs = Annotated[
-    int, typer.Option("--runs", min=1, max=100_000, help="Monte Carlo runs.", show_default=True)
-]
-#: Runs of a command that keeps many simulations in memory at once.
-PageRuns = Annotated[
-    int, typer.Option("--runs", min=1, max=2000, help="Monte Carlo runs.", show_default=True)
-]
-Seed = Annotated[
-    int,
-    typer.Option(
-        "--seed",
-        min=0,
-        max=2**64 - 1,
-        help="Seed: the same seed gives the same numbers, whatever the number of workers.",
-    ),
-]
-Workers = Annotated[
-    int | None,
-    typer.Option("--workers", min=1, max=256, help="Threads.", show_default="one per processor"),
-]
-Json = Annotated[
-    bool,
-    typer.Option(
-        "--json", help="One JSON object on stdout, nothing else.", rich_help_panel=_OUTPUT
-    ),
-]
-Quiet = Annotated[
-    bool,
-    typer.Option("--quiet", "-q", help="Only errors on stderr.", rich_help_panel=_OUTPUT),
-]

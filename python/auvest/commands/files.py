@@ -24,6 +24,13 @@ def _cell(value: Any) -> str:
     return "" if value != value else f"{value:.6g}"
 
 
+def write_results(folder: Path, document: dict[str, Any], files: dict[str, Path]) -> None:
+    """Write results.json; ``files`` gets its path, and ``document`` the paths of all files."""
+    files["results"] = folder / "results.json"
+    document["files"] = {name: str(path) for name, path in files.items()}
+    files["results"].write_text(console.to_json(document) + "\n", encoding="utf-8")
+
+
 def write_page(
     folder: Path,
     document: Mapping[str, Any],

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from auvest.commands import console
+from auvest.commands import options
 from auvest.commands.console import EXIT_CODES, Terminal
 from auvest.commands.version import version
 from auvest.logs.importers import IMPORTERS
@@ -39,8 +39,8 @@ def command(
             metavar="OUT", help="Folder for the logs; made if missing.", show_default=False
         ),
     ],
-    as_json: console.Json = False,
-    quiet: console.Quiet = False,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """Import; the help text is :data:`HELP`."""
     terminal = Terminal(as_json=as_json, quiet=quiet)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from auvest.commands import console
+from auvest.commands import console, options
 from auvest.commands.console import EXIT_CODES, ExitCode, Terminal
 from auvest.commands.version import version
 from auvest.errors import FilterError
@@ -55,16 +55,9 @@ def command(
             show_default="defaults; see docs/logs.md",
         ),
     ] = None,
-    output: Annotated[
-        Path,
-        typer.Option(
-            file_okay=False,
-            help="Folder for the results; made if missing.",
-            rich_help_panel="Output",
-        ),
-    ] = Path("auvest-output/replay"),
-    as_json: console.Json = False,
-    quiet: console.Quiet = False,
+    output: options.Output = Path("auvest-output/replay"),
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """Replay; the help text is :data:`HELP`."""
     terminal = Terminal(as_json=as_json, quiet=quiet)

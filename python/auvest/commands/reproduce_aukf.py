@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
-import typer
 from rich.table import Table
 
-from auvest.commands import console
+from auvest.commands import console, options
 from auvest.commands.console import EXIT_CODES, ExitCode, Terminal
 from auvest.commands.files import save_figures, write_page
 from auvest.commands.version import version
@@ -33,17 +31,12 @@ Examples:
 
 
 def command(
-    runs: console.PageRuns = aukf.DEFAULT_RUNS,
-    seed: console.Seed = aukf.DEFAULT_SEED,
-    workers: console.Workers = None,
-    output: Annotated[
-        Path,
-        typer.Option(
-            file_okay=False, help="Folder for the page; made if missing.", rich_help_panel="Output"
-        ),
-    ] = Path("auvest-output/reproduce-aukf"),
-    as_json: console.Json = False,
-    quiet: console.Quiet = False,
+    runs: options.PageRuns = aukf.DEFAULT_RUNS,
+    seed: options.Seed = aukf.DEFAULT_SEED,
+    workers: options.Workers = None,
+    output: options.Output = Path("auvest-output/reproduce-aukf"),
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """Reproduce; the help text is :data:`HELP`."""
     terminal = Terminal(as_json=as_json, quiet=quiet)

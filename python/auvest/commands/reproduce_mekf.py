@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from auvest.commands import console
+from auvest.commands import console, options
 from auvest.commands.console import EXIT_CODES, ExitCode, Terminal
 from auvest.commands.files import save_figures, write_page
 from auvest.commands.version import version
@@ -36,16 +36,11 @@ def command(
     runs: Annotated[
         int, typer.Option("--runs", min=2, max=500, help="Monte Carlo runs of each world.")
     ] = mekf.DEFAULT_RUNS,
-    seed: console.Seed = mekf.DEFAULT_SEED,
-    workers: console.Workers = None,
-    output: Annotated[
-        Path,
-        typer.Option(
-            file_okay=False, help="Folder for the page; made if missing.", rich_help_panel="Output"
-        ),
-    ] = Path("auvest-output/reproduce-mekf"),
-    as_json: console.Json = False,
-    quiet: console.Quiet = False,
+    seed: options.Seed = mekf.DEFAULT_SEED,
+    workers: options.Workers = None,
+    output: options.Output = Path("auvest-output/reproduce-mekf"),
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """Reproduce; the help text is :data:`HELP`."""
     terminal = Terminal(as_json=as_json, quiet=quiet)

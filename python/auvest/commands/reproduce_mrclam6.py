@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from auvest.commands import console
+from auvest.commands import console, options
 from auvest.commands.console import EXIT_CODES, ExitCode, Terminal
 from auvest.commands.version import version
 from auvest.reproduce import mrclam6
@@ -40,15 +40,10 @@ def command(
     runs: Annotated[
         int, typer.Option("--runs", min=1, max=1000, help="Runs of SLATF 2.0 over all tracks.")
     ] = mrclam6.DEFAULT_RUNS,
-    seed: console.Seed = mrclam6.DEFAULT_SEED,
-    output: Annotated[
-        Path,
-        typer.Option(
-            file_okay=False, help="Folder for the page; made if missing.", rich_help_panel="Output"
-        ),
-    ] = Path("auvest-output/reproduce-mrclam6"),
-    as_json: console.Json = False,
-    quiet: console.Quiet = False,
+    seed: options.Seed = mrclam6.DEFAULT_SEED,
+    output: options.Output = Path("auvest-output/reproduce-mrclam6"),
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """Reproduce; the help text is :data:`HELP`."""
     terminal = Terminal(as_json=as_json, quiet=quiet)

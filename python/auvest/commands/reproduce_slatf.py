@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from auvest.commands import console
+from auvest.commands import console, options
 from auvest.commands.console import EXIT_CODES, ExitCode, Terminal
 from auvest.commands.files import save_figures, write_page
 from auvest.commands.version import version
@@ -34,7 +34,7 @@ Examples:
 
 
 def command(
-    runs: console.PageRuns = slatf.DEFAULT_RUNS,
+    runs: options.PageRuns = slatf.DEFAULT_RUNS,
     particles: Annotated[
         int, typer.Option(min=1, max=100_000, help="N of SLATF 1.0, 2.0 and joint.")
     ] = slatf.DEFAULT_PARTICLES,
@@ -42,16 +42,11 @@ def command(
         DTypeName,
         typer.Option(help="Precision; float32 gives the bits of the vehicle and is faster."),
     ] = slatf.DEFAULT_DTYPE,
-    seed: console.Seed = slatf.DEFAULT_SEED,
-    workers: console.Workers = None,
-    output: Annotated[
-        Path,
-        typer.Option(
-            file_okay=False, help="Folder for the page; made if missing.", rich_help_panel="Output"
-        ),
-    ] = Path("auvest-output/reproduce-slatf"),
-    as_json: console.Json = False,
-    quiet: console.Quiet = False,
+    seed: options.Seed = slatf.DEFAULT_SEED,
+    workers: options.Workers = None,
+    output: options.Output = Path("auvest-output/reproduce-slatf"),
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """Reproduce; the help text is :data:`HELP`."""
     terminal = Terminal(as_json=as_json, quiet=quiet)

@@ -19,16 +19,15 @@ from auvest import (
     Status,
     metrics,
 )
-from auvest.commands import console
-from auvest.commands.console import EXIT_CODES, ExitCode, Terminal, refuse_given
-from auvest.commands.files import write_csv
+from auvest.commands import options
+from auvest.commands.console import EXIT_CODES, ExitCode, Terminal
+from auvest.commands.files import write_csv, write_results
+from auvest.commands.options import FILTER, MONTE_CARLO, WORLD, refuse_given
 from auvest.commands.version import version
 from auvest.intervals import IntervalPolicy
 from auvest.scenarios import paper_aukf
 from auvest.scenarios.paper_aukf import (
-    DTypeName,
     FilterName,
-    NoiseKind,
     TrackName,
     observed_positions,
 )
@@ -54,10 +53,7 @@ Examples:
 {EXIT_CODES}
 """
 
-_FILTER = "Filter"
 _INTERVAL = "Sampling interval"
-_WORLD = "World"
-_MONTE_CARLO = "Monte Carlo"
 
 _NOISE = paper_aukf.paper_noise()
 _LAW = MahalanobisInterval()
@@ -66,34 +62,33 @@ _LAW = MahalanobisInterval()
 def command(
     ctx: typer.Context,
     filter_name: Annotated[
-        FilterName, typer.Option("--filter", help="The filter.", rich_help_panel=_FILTER)
+        FilterName, typer.Option("--filter", help="The filter.", rich_help_panel=FILTER)
     ] = "aukf",
     alpha: Annotated[
         float,
         typer.Option(
-            callback=console.positive, help="Spread of the sigma points.", rich_help_panel=_FILTER
+            callback=options.positive,
+            help="Spread of the sigma points.",
+            rich_help_panel=FILTER,
         ),
     ] = paper_aukf.ALPHA,
     beta: Annotated[
         float,
         typer.Option(
-            callback=console.finite, help="Weight of prior knowledge.", rich_help_panel=_FILTER
+            callback=options.finite,
+            help="Weight of prior knowledge.",
+            rich_help_panel=FILTER,
         ),
     ] = paper_aukf.BETA,
     kappa: Annotated[
         float,
         typer.Option(
-            callback=console.finite,
+            callback=options.finite,
             help="Second scale of the sigma points, above -6.",
-            rich_help_panel=_FILTER,
+            rich_help_panel=FILTER,
         ),
     ] = paper_aukf.KAPPA,
-    dtype: Annotated[
-        DTypeName,
-        typer.Option(
-            help="Precision; float32 gives the bits of the vehicle.", rich_help_panel=_FILTER
-        ),
-    ] = "float64",
+    dtype: options.Precision = "float64",
     interval: Annotated[
         Literal["fixed", "mahalanobis", "covariance-budget"] | None,
         typer.Option(
@@ -113,7 +108,7 @@ def command(
     tau0: Annotated[
         float | None,
         typer.Option(
-            callback=console.open_unit,
+            callback=options.open_unit,
             help="First tau of the law, in (0, 1) (mahalanobis).",
             show_default=f"{_LAW.tau0:g}",
             rich_help_panel=_INTERVAL,
@@ -122,7 +117,7 @@ def command(
     fixed_interval: Annotated[
         float | None,
         typer.Option(
-            callback=console.positive,
+            callback=options.positive,
             help="The fixed interval, s (fixed).",
             show_default=f"{paper_aukf.FIXED_INTERVAL_S:g}",
             rich_help_panel=_INTERVAL,
@@ -131,7 +126,7 @@ def command(
     budget: Annotated[
         float | None,
         typer.Option(
-            callback=console.positive,
+            callback=options.positive,
             help="Position standard deviation allowed before an update, m (covariance-budget).",
             show_default=f"{CovarianceBudget().position_sigma_m:g}",
             rich_help_panel=_INTERVAL,
@@ -142,64 +137,38 @@ def command(
         typer.Option(
             help="paper: Eq. (4) as it is printed; straight: the same, exact in time; "
             f"turn: {paper_aukf.TURN_RATE_RAD_S:g} rad/s.",
-            rich_help_panel=_WORLD,
+            rich_help_panel=WORLD,
         ),
     ] = "paper",
-    noise: Annotated[
-        NoiseKind,
-        typer.Option(
-            help="Kind of both noises: U(0,1), N(0,1) or exp(N(0,1)).", rich_help_panel=_WORLD
-        ),
-    ] = "normal",
-    range_noise: Annotated[
-        float,
-        typer.Option(
-            callback=console.positive, help="Scale of the range noise, m.", rich_help_panel=_WORLD
-        ),
-    ] = _NOISE.range_m,
-    bearing_noise: Annotated[
-        float,
-        typer.Option(
-            callback=console.positive,
-            help="Scale of the bearing noise, rad.",
-            rich_help_panel=_WORLD,
-        ),
-    ] = _NOISE.bearing_rad,
+    noise: options.Noise = "normal",
+    range_noise: options.RangeNoise = _NOISE.range_m,
+    bearing_noise: options.BearingNoise = _NOISE.bearing_rad,
     noise_bias: Annotated[
         Literal["keep", "remove"],
         typer.Option(
             help="Uniform and lognormal noise have a mean: keep it, as in the paper, or remove it.",
-            rich_help_panel=_WORLD,
+            rich_help_panel=WORLD,
         ),
     ] = "keep",
     dropout: Annotated[
         float,
         typer.Option(
-            callback=console.fraction,
+            callback=options.fraction,
             help="Probability that a measurement is missing.",
-            rich_help_panel=_WORLD,
+            rich_help_panel=WORLD,
         ),
     ] = 0.0,
     steps: Annotated[
         int,
-        typer.Option(min=2, max=100_000, help="Samples of each run.", rich_help_panel=_MONTE_CARLO),
+        typer.Option(min=2, max=100_000, help="Samples of each run.", rich_help_panel=MONTE_CARLO),
     ] = paper_aukf.STEPS,
-    runs: console.Runs = 200,
-    seed: console.Seed = 1,
-    workers: console.Workers = None,
-    output: Annotated[
-        Path,
-        typer.Option(
-            file_okay=False,
-            help="Folder for figure, CSV and JSON; made if missing.",
-            rich_help_panel="Output",
-        ),
-    ] = Path("auvest-output/simulate-aukf"),
-    no_figure: Annotated[
-        bool, typer.Option("--no-figure", help="Draw nothing.", rich_help_panel="Output")
-    ] = False,
-    as_json: console.Json = False,
-    quiet: console.Quiet = False,
+    runs: options.Runs = 200,
+    seed: options.Seed = 1,
+    workers: options.Workers = None,
+    output: options.Output = Path("auvest-output/simulate-aukf"),
+    no_figure: options.NoFigure = False,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """Simulate; the help text is :data:`HELP`."""
     terminal = Terminal(as_json=as_json, quiet=quiet)
@@ -271,7 +240,6 @@ def command(
             files["figure"] = _draw(
                 output / "figure.png", result, filter_.measurement, filter_name, policy
             )
-        files["results"] = output / "results.json"
         document = {
             "command": "simulate aukf",
             "version": version(),
@@ -279,14 +247,12 @@ def command(
             "complete": not interrupted,
             "results": values,
             "per_step": per_step,
-            "files": {name: str(path) for name, path in files.items()},
         }
-        files["results"].write_text(console.to_json(document) + "\n", encoding="utf-8")
+        write_results(output, document, files)
 
     terminal.result_json(document)
     terminal.result(_table(values, settings))
-    for name, path in files.items():
-        terminal.result(f"{name.replace('_', ' '):9} {path}")
+    terminal.files(files)
     if interrupted:
         terminal.fail(
             f"interrupted: {values['runs']} of {runs} runs are done and kept", ExitCode.INTERRUPTED

@@ -13,9 +13,10 @@ import typer
 from rich.table import Table
 
 from auvest import RejectionStreak, Status, metrics
-from auvest.commands import console
+from auvest.commands import options
 from auvest.commands.console import EXIT_CODES, ExitCode, Terminal
-from auvest.commands.files import write_csv
+from auvest.commands.files import write_csv, write_results
+from auvest.commands.options import FILTER, MONTE_CARLO, WORLD
 from auvest.commands.version import version
 from auvest.kernels import KernelName
 from auvest.scenarios import cooperative
@@ -41,9 +42,6 @@ Examples:
 {EXIT_CODES}
 """
 
-_FILTER = "Filter"
-_WORLD = "World"
-_MONTE_CARLO = "Monte Carlo"
 
 _NOISE = RangeNoise()
 
@@ -51,15 +49,15 @@ _NOISE = RangeNoise()
 def command(
     kernel: Annotated[
         KernelName,
-        typer.Option(help="Robust kernel; unit: the plain filter.", rich_help_panel=_FILTER),
+        typer.Option(help="Robust kernel; unit: the plain filter.", rich_help_panel=FILTER),
     ] = "igg",
     kind: Annotated[
         Literal["ekf", "ukf"],
-        typer.Option("--filter", help="What the kernel is put into.", rich_help_panel=_FILTER),
+        typer.Option("--filter", help="What the kernel is put into.", rich_help_panel=FILTER),
     ] = "ekf",
     residual: Annotated[
         Literal["innovation", "post-fit"],
-        typer.Option(help="What the kernel judges.", rich_help_panel=_FILTER),
+        typer.Option(help="What the kernel judges.", rich_help_panel=FILTER),
     ] = "innovation",
     rejections: Annotated[
         int,
@@ -67,72 +65,71 @@ def command(
             min=0,
             max=100,
             help="Rejections in a row after which the covariance is widened; 0: never.",
-            rich_help_panel=_FILTER,
+            rich_help_panel=FILTER,
         ),
     ] = RejectionStreak().rejections,
-    dtype: Annotated[
-        Literal["float64", "float32"],
-        typer.Option(
-            help="Precision; float32 gives the bits of the vehicle.", rich_help_panel=_FILTER
-        ),
-    ] = "float64",
+    dtype: options.Precision = "float64",
     noise: Annotated[
         NoiseKind,
         typer.Option(
             help="contaminated: outliers of another size; multipath: outliers too long; "
             "student: Student's t.",
-            rich_help_panel=_WORLD,
+            rich_help_panel=WORLD,
         ),
     ] = "contaminated",
     range_noise: Annotated[
         float,
         typer.Option(
-            callback=console.positive, help="Scale of the range noise, m.", rich_help_panel=_WORLD
+            callback=options.positive,
+            help="Scale of the range noise, m.",
+            rich_help_panel=WORLD,
         ),
     ] = _NOISE.sigma_m,
     outliers: Annotated[
         float,
         typer.Option(
-            callback=console.fraction, help="Share of the outliers.", rich_help_panel=_WORLD
+            callback=options.fraction, help="Share of the outliers.", rich_help_panel=WORLD
         ),
     ] = 0.05,
     outlier_sigma: Annotated[
         float,
         typer.Option(
-            callback=console.positive, help="Size of the outliers, m.", rich_help_panel=_WORLD
+            callback=options.positive,
+            help="Size of the outliers, m.",
+            rich_help_panel=WORLD,
         ),
     ] = _NOISE.outlier_sigma_m,
     degrees_of_freedom: Annotated[
-        int, typer.Option(min=1, max=100, help="Of Student's t.", rich_help_panel=_WORLD)
+        int, typer.Option(min=1, max=100, help="Of Student's t.", rich_help_panel=WORLD)
     ] = _NOISE.degrees_of_freedom,
     timing: Annotated[
         Timing,
         typer.Option(
             help="at-once: a range is there when it is measured; own-time: it comes with the next "
             "message and is taken at its own time; as-if-fresh: the same, the delay ignored.",
-            rich_help_panel=_WORLD,
+            rich_help_panel=WORLD,
         ),
     ] = "own-time",
     dropout: Annotated[
         float,
         typer.Option(
-            callback=console.fraction, help="Share of messages lost.", rich_help_panel=_WORLD
+            callback=options.fraction, help="Share of messages lost.", rich_help_panel=WORLD
         ),
     ] = 0.0,
     late: Annotated[
         float,
         typer.Option(
-            callback=console.fraction,
+            callback=options.fraction,
             help="Share of messages that are up to 10 s late.",
-            rich_help_panel=_WORLD,
+            rich_help_panel=WORLD,
         ),
     ] = 0.0,
     displaced: Annotated[
         float,
         typer.Option(
-            callback=console.finite,
+            callback=options.finite,
             help="Error of the start along x that the filter does not know of, m.",
-            rich_help_panel=_WORLD,
+            rich_help_panel=WORLD,
         ),
     ] = 0.0,
     steps: Annotated[
@@ -141,25 +138,16 @@ def command(
             min=2,
             max=100_000,
             help="Seconds of each run; 8280: 2.3 h.",
-            rich_help_panel=_MONTE_CARLO,
+            rich_help_panel=MONTE_CARLO,
         ),
     ] = cooperative.PAPER_STEPS,
-    runs: console.Runs = 50,
-    seed: console.Seed = 1,
-    workers: console.Workers = None,
-    output: Annotated[
-        Path,
-        typer.Option(
-            file_okay=False,
-            help="Folder for figure, CSV and JSON; made if missing.",
-            rich_help_panel="Output",
-        ),
-    ] = Path("auvest-output/simulate-mekf"),
-    no_figure: Annotated[
-        bool, typer.Option("--no-figure", help="Draw nothing.", rich_help_panel="Output")
-    ] = False,
-    as_json: console.Json = False,
-    quiet: console.Quiet = False,
+    runs: options.Runs = 50,
+    seed: options.Seed = 1,
+    workers: options.Workers = None,
+    output: options.Output = Path("auvest-output/simulate-mekf"),
+    no_figure: options.NoFigure = False,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """Simulate; the help text is :data:`HELP`."""
     terminal = Terminal(as_json=as_json, quiet=quiet)
@@ -227,21 +215,18 @@ def command(
         files = {"per_step": write_csv(output / "per_step.csv", per_step)}
         if not no_figure:
             files["figure"] = _draw(output / "figure.png", results, kernel, kind)
-        files["results"] = output / "results.json"
         document = {
             "command": "simulate mekf",
             "version": version(),
             "settings": settings,
             "complete": not interrupted,
             "results": values,
-            "files": {name: str(path) for name, path in files.items()},
         }
-        files["results"].write_text(console.to_json(document) + "\n", encoding="utf-8")
+        write_results(output, document, files)
 
     terminal.result_json(document)
     terminal.result(_table(values, settings))
-    for name, path in files.items():
-        terminal.result(f"{name.replace('_', ' '):9} {path}")
+    terminal.files(files)
     if interrupted:
         terminal.fail("interrupted: what was done is kept", ExitCode.INTERRUPTED)
     for name, result in results.items():

@@ -12,9 +12,10 @@ import typer
 from rich.table import Table
 
 from auvest import Status, metrics, montecarlo
-from auvest.commands import console
-from auvest.commands.console import EXIT_CODES, ExitCode, Terminal, refuse_given
-from auvest.commands.files import write_csv
+from auvest.commands import options
+from auvest.commands.console import EXIT_CODES, ExitCode, Terminal
+from auvest.commands.files import write_csv, write_results
+from auvest.commands.options import FILTER, WORLD, refuse_given
 from auvest.commands.version import version
 from auvest.scenarios.paper_aukf import DTypeName
 from auvest.scenarios.paper_slatf import LEVELS, PARTICLES, RUNS
@@ -51,8 +52,6 @@ Examples:
 {EXIT_CODES}
 """
 
-_FILTER = "Filter"
-_WORLD = "World"
 
 FilterOption = Literal["slatf1", "slatf2", "slatf-joint", "ekf-slat", "dead-reckoning"]
 _PARTICLE_FILTERS: tuple[FilterOption, ...] = ("slatf1", "slatf2", "slatf-joint")
@@ -68,129 +67,120 @@ _TITLES: dict[FilterOption, str] = {
 def command(
     ctx: typer.Context,
     filter_name: Annotated[
-        FilterOption, typer.Option("--filter", help="The filter.", rich_help_panel=_FILTER)
+        FilterOption, typer.Option("--filter", help="The filter.", rich_help_panel=FILTER)
     ] = "slatf2",
     particles: Annotated[
         int,
         typer.Option(
-            min=1, max=1_000_000, help="N (slatf1, slatf2, slatf-joint).", rich_help_panel=_FILTER
+            min=1,
+            max=1_000_000,
+            help="N (slatf1, slatf2, slatf-joint).",
+            rich_help_panel=FILTER,
         ),
     ] = PARTICLES,
     resampling: Annotated[
         Resampling,
         typer.Option(
-            help="Resampling policy (slatf1, slatf2, slatf-joint).", rich_help_panel=_FILTER
+            help="Resampling policy (slatf1, slatf2, slatf-joint).", rich_help_panel=FILTER
         ),
     ] = "systematic",
     gate: Annotated[
         float,
         typer.Option(
-            callback=console.not_negative,
+            callback=options.not_negative,
             help="NIS beyond which an echo says nothing; 0: no gate.",
-            rich_help_panel=_FILTER,
+            rich_help_panel=FILTER,
         ),
     ] = 0.0,
     heading_bias: Annotated[
         Literal["compensate", "keep"],
         typer.Option(
             help="Bias of the heading's noise: make up for it, or keep it, as in the paper.",
-            rich_help_panel=_FILTER,
+            rich_help_panel=FILTER,
         ),
     ] = "compensate",
-    dtype: Annotated[
-        DTypeName,
-        typer.Option(
-            help="Precision; float32 gives the bits of the vehicle.", rich_help_panel=_FILTER
-        ),
-    ] = "float64",
+    dtype: options.Precision = "float64",
     lanes: Annotated[
         Lanes | None,
         typer.Option(
             help="Instruction set of the particles; the bits are the same.",
             show_default="the widest here",
-            rich_help_panel=_FILTER,
+            rich_help_panel=FILTER,
         ),
     ] = None,
     level: Annotated[
         int,
         typer.Option(
-            min=1, max=len(LEVELS), help="Noise level of section 7.", rich_help_panel=_WORLD
+            min=1, max=len(LEVELS), help="Noise level of section 7.", rich_help_panel=WORLD
         ),
     ] = 3,
     range_noise: Annotated[
         float | None,
         typer.Option(
-            callback=console.positive,
+            callback=options.positive,
             help="Noise of the range, m.",
             show_default="of the level",
-            rich_help_panel=_WORLD,
+            rich_help_panel=WORLD,
         ),
     ] = None,
     bearing_noise: Annotated[
         float | None,
         typer.Option(
-            callback=console.positive,
+            callback=options.positive,
             help="Noise of the bearing, rad.",
             show_default="of the level",
-            rich_help_panel=_WORLD,
+            rich_help_panel=WORLD,
         ),
     ] = None,
     masters: Annotated[
-        int, typer.Option(min=1, max=MAX_MASTERS, help="Masters.", rich_help_panel=_WORLD)
+        int, typer.Option(min=1, max=MAX_MASTERS, help="Masters.", rich_help_panel=WORLD)
     ] = 1,
     association: Annotated[
         Literal["known", "unknown"],
-        typer.Option(help="Whether the slave knows whose echo it hears.", rich_help_panel=_WORLD),
+        typer.Option(help="Whether the slave knows whose echo it hears.", rich_help_panel=WORLD),
     ] = "known",
     plan: Annotated[
         Literal["known", "unknown"],
         typer.Option(
             help="Whether the slave knows how the masters turn, u of Eq. (4).",
-            rich_help_panel=_WORLD,
+            rich_help_panel=WORLD,
         ),
     ] = "known",
     dropout: Annotated[
         float,
         typer.Option(
-            callback=console.fraction,
+            callback=options.fraction,
             help="Probability that an echo is lost.",
-            rich_help_panel=_WORLD,
+            rich_help_panel=WORLD,
         ),
     ] = 0.0,
     outlier: Annotated[
         float,
         typer.Option(
-            callback=console.fraction,
+            callback=options.fraction,
             help="Probability that an echo is wrong by 100 standard deviations.",
-            rich_help_panel=_WORLD,
+            rich_help_panel=WORLD,
         ),
     ] = 0.0,
     duration: Annotated[
         float,
         typer.Option(
-            callback=console.positive, help="Length of the outage, s.", rich_help_panel=_WORLD
+            callback=options.positive,
+            help="Length of the outage, s.",
+            rich_help_panel=WORLD,
         ),
     ] = SlatScenario().duration_s,
-    runs: console.Runs = RUNS,
-    seed: console.Seed = 1,
-    workers: console.Workers = None,
-    output: Annotated[
-        Path,
-        typer.Option(
-            file_okay=False,
-            help="Folder for figure, tables and JSON; made if missing.",
-            rich_help_panel="Output",
-        ),
-    ] = Path("auvest-output/simulate-slatf"),
+    runs: options.Runs = RUNS,
+    seed: options.Seed = 1,
+    workers: options.Workers = None,
+    output: options.Output = Path("auvest-output/simulate-slatf"),
     table: Annotated[
         Literal["csv", "parquet"],
         typer.Option(help="Format of the table of runs.", rich_help_panel="Output"),
     ] = "csv",
-    no_figure: Annotated[
-        bool, typer.Option("--no-figure", help="Draw nothing.", rich_help_panel="Output")
-    ] = False,
-    as_json: console.Json = False,
-    quiet: console.Quiet = False,
+    no_figure: options.NoFigure = False,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """Simulate; the help text is :data:`HELP`."""
     terminal = Terminal(as_json=as_json, quiet=quiet)
@@ -266,7 +256,6 @@ def command(
         }
         if not no_figure:
             files["figure"] = _draw(output / "figure.png", result, _TITLES[filter_name])
-        files["results"] = output / "results.json"
         document = {
             "command": "simulate slatf",
             "version": version(),
@@ -274,14 +263,12 @@ def command(
             "complete": not interrupted,
             "results": values,
             "per_ping": per_ping,
-            "files": {name: str(path) for name, path in files.items()},
         }
-        files["results"].write_text(console.to_json(document) + "\n", encoding="utf-8")
+        write_results(output, document, files)
 
     terminal.result_json(document)
     terminal.result(_table(values, scenario, _TITLES[filter_name]))
-    for name, path in files.items():
-        terminal.result(f"{name.replace('_', ' '):9} {path}")
+    terminal.files(files)
     if interrupted:
         terminal.fail(
             f"interrupted: {values['runs']} of {runs} runs are done and kept; the same command "

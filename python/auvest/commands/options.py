@@ -1,0 +1,140 @@
+"""Options that mean the same in every command, and checks of option values."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from auvest.scenarios.paper_aukf import DTypeName, NoiseKind
+
+# Panels of --help.
+FILTER = "Filter"
+WORLD = "World"
+MONTE_CARLO = "Monte Carlo"
+_OUTPUT = "Output"
+
+
+def refuse_given(ctx: typer.Context, names: tuple[str, ...], why: str) -> None:
+    """Refuse options that were given and would do nothing."""
+    for name in names:
+        source = ctx.get_parameter_source(name)
+        if source is not None and source.name != "DEFAULT":
+            raise typer.BadParameter(why, param_hint=f"'--{name.replace('_', '-')}'")
+
+
+def positive(value: float | None) -> float | None:
+    """Option callback: a finite number above zero."""
+    if value is not None and not (math.isfinite(value) and value > 0):
+        raise typer.BadParameter(f"{value} is not a finite number above 0.")
+    return value
+
+
+def not_negative(value: float) -> float:
+    """Option callback: a finite number of at least zero."""
+    if not (math.isfinite(value) and value >= 0):
+        raise typer.BadParameter(f"{value} is not a finite number of at least 0.")
+    return value
+
+
+def finite(value: float | None) -> float | None:
+    """Option callback: any finite number."""
+    if value is not None and not math.isfinite(value):
+        raise typer.BadParameter(f"{value} is not a finite number.")
+    return value
+
+
+def fraction(value: float | None) -> float | None:
+    """Option callback: a probability below one."""
+    if value is not None and not 0 <= value < 1:
+        raise typer.BadParameter(f"{value} is not a probability of at least 0 and below 1.")
+    return value
+
+
+def open_unit(value: float | None) -> float | None:
+    """Option callback: strictly between zero and one."""
+    if value is not None and not 0 < value < 1:
+        raise typer.BadParameter(f"{value} is not strictly between 0 and 1.")
+    return value
+
+
+Runs = Annotated[
+    int, typer.Option("--runs", min=1, max=100_000, help="Monte Carlo runs.", show_default=True)
+]
+#: Runs of a command that keeps many simulations in memory at once.
+PageRuns = Annotated[
+    int, typer.Option("--runs", min=1, max=2000, help="Monte Carlo runs.", show_default=True)
+]
+Seed = Annotated[
+    int,
+    typer.Option(
+        "--seed",
+        min=0,
+        max=2**64 - 1,
+        help="Seed: the same seed gives the same numbers, whatever the number of workers.",
+    ),
+]
+Workers = Annotated[
+    int | None,
+    typer.Option("--workers", min=1, max=256, help="Threads.", show_default="one per processor"),
+]
+Json = Annotated[
+    bool,
+    typer.Option(
+        "--json", help="One JSON object on stdout, nothing else.", rich_help_panel=_OUTPUT
+    ),
+]
+Quiet = Annotated[
+    bool,
+    typer.Option("--quiet", "-q", help="Only errors on stderr.", rich_help_panel=_OUTPUT),
+]
+Output = Annotated[
+    Path,
+    typer.Option(
+        "--output",
+        file_okay=False,
+        help="Folder for the results; made if missing.",
+        rich_help_panel=_OUTPUT,
+    ),
+]
+NoFigure = Annotated[
+    bool, typer.Option("--no-figure", help="Draw nothing.", rich_help_panel=_OUTPUT)
+]
+Precision = Annotated[
+    DTypeName,
+    typer.Option(
+        "--dtype",
+        help="Precision; float32 gives the bits of the vehicle.",
+        rich_help_panel=FILTER,
+    ),
+]
+
+# The noise of the AUKF paper's scenario.
+Noise = Annotated[
+    NoiseKind,
+    typer.Option(
+        "--noise",
+        help="Kind of both noises: U(0,1), N(0,1) or exp(N(0,1)).",
+        rich_help_panel=WORLD,
+    ),
+]
+RangeNoise = Annotated[
+    float,
+    typer.Option(
+        "--range-noise",
+        callback=positive,
+        help="Scale of the range noise, m.",
+        rich_help_panel=WORLD,
+    ),
+]
+BearingNoise = Annotated[
+    float,
+    typer.Option(
+        "--bearing-noise",
+        callback=positive,
+        help="Scale of the bearing noise, rad.",
+        rich_help_panel=WORLD,
+    ),
+]
