@@ -36,6 +36,7 @@ ROOT = Path(__file__).resolve().parents[1]
 BUDGETS = ROOT / "firmware" / "budgets.csv"
 PAGE = ROOT / "docs" / "budgets.md"
 EXAMPLES = ROOT / "firmware" / "library" / "examples"
+SKETCHES = ROOT / "firmware" / "budget_sketches"
 
 TARGET = "atmega2560"
 
@@ -92,67 +93,6 @@ class Row:
 
 # ---- The programs --------------------------------------------------------------------------------
 
-_EMPTY = """\
-void setup() {}
-void loop() {}
-"""
-
-# A filter at work and nothing else: measurements come in, and the estimate stays where it is.
-_FILTER = """\
-#include <auvest.h>
-
-#include "board.hpp"
-
-using Process = auvest::EulerAcceleration<float>;
-using Filter = @FILTER@;
-static_assert(sizeof(Filter) <= 320, "more RAM than promised");
-
-auvest::Ukf<Process>::Params points() {
-  auvest::Ukf<Process>::Params params = auvest::Ukf<Process>::default_params();
-  params.alpha = 1e-6f;
-  return params;
-}
-
-Filter filter{@MAKE@};
-const auvest::RangeBearing<float, 6> sonar;
-
-float next() {
-  uint32_t bits = 0;
-  for (uint8_t i = 0; i < 4; ++i) bits = bits >> 8 | static_cast<uint32_t>(board::read()) << 24;
-  return auvest::math::from_bits(bits);
-}
-
-auvest::Status step(const auvest::Vector<float, 2>& z, const auvest::Vector<float, 2>& desired) {
-  @STEP@
-}
-
-// Inlined into main(), as setup() and loop() are, these frames would lie below one another.
-__attribute__((noinline)) void start() {
-  Filter::State x;
-  Filter::Covariance P;
-  auvest::math::set_zero(P);
-  for (uint8_t i = 0; i < 6; ++i) x(i) = next();
-  for (uint8_t i = 0; i < 6; ++i) P(i, i) = next();
-  if (filter.reset(x, P) != auvest::Status::kOk) board::fail();
-}
-
-__attribute__((noinline)) void sample() {
-  auvest::Vector<float, 2> z;
-  auvest::Vector<float, 2> desired;
-  for (uint8_t i = 0; i < 2; ++i) z(i) = next();
-  for (uint8_t i = 0; i < 2; ++i) desired(i) = next();
-  if (auvest::math::is_nan(z(0))) board::finish();
-  board::begin(1);
-  const auvest::Status status = step(z, desired);
-  board::end(1);
-  if (status != auvest::Status::kOk) board::fail();
-}
-
-void setup() { start(); }
-
-void loop() { sample(); }
-"""
-
 _FIXED_STEP = """auvest::Status status = filter.predict(0.5f);
   if (status == auvest::Status::kOk) status = filter.update(z, sonar).status;
   return status;"""
@@ -161,172 +101,36 @@ _ADAPTIVE_STEP = """auvest::Status status = filter.predict(filter.interval());
   if (status == auvest::Status::kOk) status = filter.feedback(desired);
   return status;"""
 
-# The same for ranges to leaders, with dead reckoning between them.
-_RANGE_FILTER = """\
-#include <auvest.h>
 
-#include "board.hpp"
+def _filter(kind: str, arguments: str, step: str) -> tuple[str, dict[str, str]]:
+    return "filter", {"FILTER": kind, "ARGUMENTS": arguments, "STEP": step}
 
-using Process = auvest::SpeedHeading<float>;
-using Filter = auvest::RobustEkf<Process>;
-static_assert(sizeof(Filter) <= 100, "more RAM than promised");
 
-Filter filter{auvest::Ekf<Process>(Process())};
-
-float next() {
-  uint32_t bits = 0;
-  for (uint8_t i = 0; i < 4; ++i) bits = bits >> 8 | static_cast<uint32_t>(board::read()) << 24;
-  return auvest::math::from_bits(bits);
-}
-
-// Inlined into main(), as setup() is, this frame would stay on the stack for good.
-__attribute__((noinline)) void start() {
-  Filter::State x;
-  Filter::Covariance P;
-  auvest::math::set_zero(x);
-  auvest::math::set_zero(P);
-  P(0, 0) = P(1, 1) = next();
-  if (filter.reset(x, P) != auvest::Status::kOk) board::fail();
-}
-
-void setup() { start(); }
-
-void loop() {
-  auvest::Vector<float, 3> motion;
-  auvest::LeaderRange<float, 2> leader;
-  auvest::Vector<float, 1> z;
-  for (uint8_t i = 0; i < 3; ++i) motion(i) = next();
-  leader.params.leader_x_m = next();
-  leader.params.leader_y_m = next();
-  z(0) = next();
-  if (auvest::math::is_nan(z(0))) board::finish();
-  board::begin(@PREDICT@);
-  auvest::Status status = filter.predict(5.0f, motion);
-  board::end(@PREDICT@);
-  if (status != auvest::Status::kOk) board::fail();
-  board::begin(@UPDATE@);
-  status = filter.update(z, leader).status;
-  board::end(@UPDATE@);
-  if (status != auvest::Status::kOk) board::fail();
-}
-"""
-
-#: The range filter's two programs: which section, of which 1 is reported, is predict and update.
-_RANGE_SECTIONS = {"robust_ekf_predict": (1, 2), "robust_ekf_update": (2, 1)}
-
-#: Program, type, constructor's argument and step of each filter.
-_FILTERS: Mapping[str, tuple[str, str, str]] = {
-    "ekf": ("auvest::Ekf<Process>", "Process()", _FIXED_STEP),
-    "ukf": ("auvest::Ukf<Process>", "Process(), points()", _FIXED_STEP),
-    "aukf": ("auvest::Aukf<Process>", "Process(), points()", _ADAPTIVE_STEP),
-    "aukf_covariance_budget": (
+#: Template in SKETCHES of each program, and what stands in its places. The two programs of the
+#: range filter are one, of which the section with number 1 is reported.
+_PROGRAMS: Mapping[str, tuple[str, Mapping[str, str]]] = {
+    "empty": ("empty", {}),
+    "ekf": _filter("auvest::Ekf<Process>", "Process()", _FIXED_STEP),
+    "ukf": _filter("auvest::Ukf<Process>", "Process(), points()", _FIXED_STEP),
+    "aukf": _filter("auvest::Aukf<Process>", "Process(), points()", _ADAPTIVE_STEP),
+    "aukf_covariance_budget": _filter(
         "auvest::Aukf<Process, auvest::CovarianceBudget<float>>",
         "Process(), points()",
         _ADAPTIVE_STEP,
     ),
+    "robust_ekf_predict": ("range_filter", {"PREDICT": "1", "UPDATE": "2"}),
+    "robust_ekf_update": ("range_filter", {"PREDICT": "2", "UPDATE": "1"}),
+    "slatf1": ("slatf", {"KIND": "Slatf1", "PARTICLES": str(AVR_PARTICLES)}),
+    "slatf2": ("slatf", {"KIND": "Slatf2", "PARTICLES": str(AVR_PARTICLES)}),
 }
-
-
-# SLATF at work: between two echoes there are two readings of the odometry.
-_SLATF = """\
-#include <auvest.h>
-
-#include "board.hpp"
-
-using Motion = auvest::CompassMotion<float>;
-using Master = auvest::PiecewiseAcceleration<float>;
-using Filter = auvest::@KIND@<Motion, Master, 1>;
-
-Filter::Storage<@PARTICLES@> particles;
-Filter filter(Motion(), Master(), Filter::Params(), particles);
-const auvest::Sonar<float> sonar;
-auvest::math::Random numbers(1);
-auvest::Status status = auvest::Status::kOk;
-
-// In a struct, where arduino-builder leaves them alone.
-struct Record {
-  static float next() {
-    uint32_t bits = 0;
-    for (uint8_t i = 0; i < 4; ++i) bits = bits >> 8 | static_cast<uint32_t>(board::read()) << 24;
-    return auvest::math::from_bits(bits);
-  }
-
-  static void read(auvest::Vector<float, 2>& vector) {
-    for (uint8_t i = 0; i < 2; ++i) vector(i) = next();
-  }
-
-  template <int Size>
-  static void read(auvest::Belief<float, Size>& belief) {
-    auvest::math::set_zero(belief.P);
-    for (uint8_t i = 0; i < Size; ++i) belief.x(i) = next();
-    for (uint8_t i = 0; i < Size; ++i) {
-      for (uint8_t j = 0; j <= i; ++j) belief.P(i, j) = next();
-    }
-  }
-};
-
-struct Reading {
-  float dt;
-  Filter::Control u;
-  Filter::VelocityChange change;
-  auvest::Sighting<float> echo;
-
-  void read() {
-    dt = Record::next();
-    Record::read(u);
-    Record::read(change);
-    Record::next();  // whether there is an echo: behind every other reading
-    Record::read(echo.z);
-    echo.master = 0;
-  }
-};
-
-void note(auvest::Status result) {
-  if (status == auvest::Status::kOk) status = result;
-}
-
-__attribute__((noinline)) void start() {
-  Filter::SlaveBelief slave;
-  Filter::MasterBelief master;
-  Record::read(slave);
-  Record::read(master);
-  note(filter.reset(slave, numbers));
-  note(filter.add_master(master));
-}
-
-__attribute__((noinline)) void step(const Reading (&readings)[2]) {
-  for (const Reading& reading : readings) {
-    note(filter.predict(reading.dt, reading.u, numbers, &reading.change));
-  }
-  note(filter.update(&readings[1].echo, 1, sonar, numbers));
-}
-
-void setup() { start(); }
-
-void loop() {
-  Reading readings[2];
-  for (Reading& reading : readings) reading.read();
-  if (auvest::math::is_nan(readings[0].dt)) board::finish();
-  board::begin(1);
-  step(readings);
-  board::end(1);
-  if (status != auvest::Status::kOk) board::fail();
-}
-"""
-
-_SLATFS = {"slatf1": "Slatf1", "slatf2": "Slatf2"}
 
 
 def _source(program: str) -> str:
-    if program in _SLATFS:
-        source = _SLATF.replace("@KIND@", _SLATFS[program])
-        return source.replace("@PARTICLES@", str(AVR_PARTICLES))
-    if program in _RANGE_SECTIONS:
-        predict, update = _RANGE_SECTIONS[program]
-        source = _RANGE_FILTER.replace("@PREDICT@", str(predict))
-        return source.replace("@UPDATE@", str(update))
-    kind, make, step = _FILTERS[program]
-    return _FILTER.replace("@FILTER@", kind).replace("@MAKE@", make).replace("@STEP@", step)
+    template, values = _PROGRAMS[program]
+    text = (SKETCHES / f"{template}.ino.in").read_text(encoding="utf-8")
+    for name, value in values.items():
+        text = text.replace(f"@{name}@", value)
+    return text
 
 
 def _slatf_record() -> bytes:
@@ -339,7 +143,7 @@ def _slatf_record() -> bytes:
 
 def _record(program: str) -> bytes:
     """Start, variances and the steps of a vehicle that circles through the station."""
-    if program in _RANGE_SECTIONS:
+    if _PROGRAMS[program][0] == "range_filter":
         return _range_record(STEPS[program])
     names: Mapping[str, FilterName] = {"ekf": "ekf", "ukf": "ukf"}
     name = names.get(program, "aukf")
@@ -391,9 +195,10 @@ def measure(output: Path) -> list[Row]:
         `empty`, the filters, the examples.
     """
     library = package(output)
-    programs: dict[str, Callable[[Compiled, Path], Row]] = {"empty": _run_empty}
-    programs.update(dict.fromkeys([*_FILTERS, *_RANGE_SECTIONS], _run_filter))
-    programs.update(dict.fromkeys(_SLATFS, _run_slatf))
+    runners = {"empty": _run_empty, "slatf": _run_slatf}
+    programs: dict[str, Callable[[Compiled, Path], Row]] = {
+        program: runners.get(template, _run_filter) for program, (template, _) in _PROGRAMS.items()
+    }
     programs["first_steps"] = _run_first_steps
     programs["replay"] = _run_replay
     programs["tracking_loop"] = _run_tracking_loop
@@ -406,8 +211,7 @@ def measure(output: Path) -> list[Row]:
             shutil.copytree(EXAMPLES / program, folder)
         else:
             folder.mkdir(parents=True)
-            source = _EMPTY if program == "empty" else _source(program)
-            (folder / f"{program}.ino").write_text(source, encoding="utf-8")
+            (folder / f"{program}.ino").write_text(_source(program), encoding="utf-8")
             shutil.copy(ROOT / "firmware" / "board" / "board.hpp", folder)
         compiled[program] = compile_sketch(folder, library, output / "compiled")
     with ThreadPoolExecutor(os.cpu_count()) as pool:
@@ -638,7 +442,7 @@ def slatf_page(rows: list[Row]) -> list[str]:
         "| program | particles | cycles per particle and step | of the sonar period |",
         "|---|---:|---:|---:|",
     ]
-    for name in (*_SLATFS, "slave_tracking"):
+    for name in ("slatf1", "slatf2", "slave_tracking"):
         cycles = by_name[name].cycles_median
         if cycles is None:
             raise BudgetError(f"{name} has no cycles")
