@@ -20,20 +20,16 @@ namespace math {
 /// nearest float (double) to pi; an angle inside the bounds comes back bit for bit, others are
 /// reduced modulo the real 2 pi, to within 1 ulp. Not finite: NaN.
 AUVEST_OUTLINE AUVEST_INLINE float wrap(float a) {
-  const uint32_t sign = to_bits(a) & 0x80000000u;
-  const uint32_t size = to_bits(a) ^ sign;
-  if (size < 0x40490fdbu) return a;  // pi
-  if (size == 0x40490fdbu) return pi<float>();
-  if (size >= 0x7f800000u) return quiet_nan();
-  float wrapped = from_bits(size);
-  if (size <= 0x4116cbe3u) {  // 3 pi, rounded down
-    // Exact, then one rounding: 2 pi = 6.28318548 - 1.74845553e-07.
-    wrapped = (wrapped - 6.28318548f) + 1.74845553e-07f;
-  } else {
-    wrapped = detail::turn_to_radian(detail::fraction_of_turn(wrapped));
-    if (absolute(wrapped) == pi<float>()) return pi<float>();
+  const float size = absolute(a);
+  if (!is_finite(a)) return quiet_nan();
+  float wrapped = a;
+  if (size > pi<float>()) {
+    // Up to 3 pi exact, then one rounding: 2 pi = 6.28318548 - 1.74845553e-07.
+    wrapped = size <= 9.424777f ? (size - 6.28318548f) + 1.74845553e-07f
+                                : detail::turn_to_radian(detail::fraction_of_turn(size));
+    if ((to_bits(a) & 0x80000000u) != 0) wrapped = -wrapped;
   }
-  return from_bits(to_bits(wrapped) ^ sign);
+  return absolute(wrapped) == pi<float>() ? pi<float>() : wrapped;
 }
 
 namespace detail {

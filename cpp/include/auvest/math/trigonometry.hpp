@@ -190,14 +190,6 @@ AUVEST_INLINE void sincos_reduced(const ReducedAngle& r, float& s, float& c) {
   if (((r.quarter + 1u) & 2u) != 0) c = -c;
 }
 
-/// y / x for 0 <= y < x 2^-100 (or y = 0 = x): the quotient may be subnormal, where not every
-/// target's division rounds correctly.
-inline float tiny_quotient(float y, float x) {
-  const float scaled = y * 1.84467441e+19f / x;   // times 2^64
-  if (!(scaled >= 1.29246971e-26f)) return 0.0f;  // 2^-86; NaN if x is 0 or infinite
-  return scale_by_power(scaled, -64);
-}
-
 /// The double functions, by the size of double.
 template <std::size_t Bytes>
 struct DoubleTrigonometry {
@@ -341,29 +333,35 @@ inline void sincos(float x, float& s, float& c) {
 AUVEST_OUTLINE AUVEST_INLINE float atan2(float y, float x) {
   const float size_x = absolute(x);
   const float size_y = absolute(y);
-  const bool steep = size_y > size_x;
-  const bool left = (to_bits(x) & 0x80000000u) != 0;
-  float ratio = steep ? size_x / size_y : size_y / size_x;
-  if (size_x == size_y) ratio = size_x > 0.0f ? 1.0f : 0.0f;  // also two zeros or two infinities
-  if (is_nan(ratio)) return quiet_nan();
-  // By octant: 0, pi/2 or pi, in two parts, plus or minus atan(ratio).
+  // By octant: 0, pi/2 or pi plus or minus atan(z).
   float high = 0.0f;
-  float tail = 0.0f;
-  if (steep) {
-    high = 1.57079637f;
-    tail = -4.37113883e-08f;
-  } else if (left) {
+  bool minus = false;
+  if ((to_bits(x) & 0x80000000u) != 0) {
     high = 3.14159274f;
-    tail = -8.74227766e-08f;
-  } else if (to_bits(ratio) < 0x0d800000u) {  // 2^-100
-    return copy_sign(detail::tiny_quotient(size_y, size_x), y);
+    minus = true;
   }
-  const float z = steep != left ? -ratio : ratio;
+  float small = size_y;
+  float large = size_x;
+  if (size_y > size_x) {
+    high = 1.57079637f;
+    minus = !minus;
+    small = size_x;
+    large = size_y;
+  }
+  float z = small / large;
+  if (is_nan(z)) {
+    if (!(small == large)) return quiet_nan();
+    z = to_bits(small) != 0 ? 1.0f : 0.0f;                       // two infinities or two zeros
+  } else if (to_bits(z) < 0x0d800000u && to_bits(small) != 0) {  // 2^-100
+    // Where the quotient would be subnormal not every target rounds it correctly; a product it
+    // does.
+    z = small / (large * 5.96046448e-08f) * 5.96046448e-08f;  // 2^-24
+  }
+  float tail = high * -2.78275338e-08f;  // what `high` lacks
+  const float u = z * z;
+  if (minus) z = -z;
   // Below 2^-12 z^3 / 3 is less than a sixth of an ulp of z; powers of z would become subnormal.
-  if (to_bits(ratio) >= 0x39800000u) {
-    const float u = ratio * ratio;
-    tail = tail + z * (u * detail::atan_polynomial(u));
-  }
+  if (u >= 5.96046448e-08f) tail = tail + z * (u * detail::atan_polynomial(u));
   return copy_sign((high + z) + tail, y);
 }
 
