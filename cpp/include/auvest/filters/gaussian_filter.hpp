@@ -61,7 +61,8 @@ class GaussianFilter {
     if (!initialised_) return Status::kNotInitialised;
     if (!math::is_finite(dt)) return Status::kNotFinite;
     if (dt < Scalar(0)) return Status::kTimeBackwards;
-    const BeliefType before = belief_;
+    BeliefType before;
+    math::copy(belief_, before);
     Status status = derived().predict_belief(belief_, dt);
     if (status == Status::kOk && !math::all_finite(belief_)) status = Status::kOverflow;
     if (status != Status::kOk) math::copy(before, belief_);

@@ -83,14 +83,13 @@ AUVEST_INLINE void project(const Matrix<Value, M, O>& h, const Matrix<Value, O, 
 template <class Value, int M, int O>
 AUVEST_INLINE void innovation_covariance(const Matrix<Value, M, O>& a,
                                          const Matrix<Value, M, M>& noise, Matrix<Value, M, M>& s) {
+  math::copy(noise, s);
   AUVEST_UNROLL
   for (int i = 0; i < M; ++i) {
     AUVEST_UNROLL
-    for (int j = 0; j <= i; ++j) {
-      s(i, j) = math::plus_dot(noise(i, j), &a(i, 0), &a(j, 0), O);
-      s(j, i) = s(i, j);
-    }
+    for (int j = 0; j <= i; ++j) s(i, j) = math::plus_dot(s(i, j), &a(i, 0), &a(j, 0), O);
   }
+  math::mirror_lower(s);
 }
 
 /// Potter's formula, one decorrelated measurement after the other. `noise` is E = U D U' as
@@ -156,13 +155,13 @@ AUVEST_OUTLINE AUVEST_INLINE math::Mask<Value> move_belief(Belief<Value, N>& bel
   Vector<Value, N> x;
   Vector<Value, O> shift;  // L y
   AUVEST_UNROLL
-  for (int i = 0; i < N; ++i) {
-    if (i < O) {
-      shift(i) = dot(&root(i, 0), posterior.y.data(), i + 1);
-      x(i) = belief.x(i) + shift(i);
-    } else {
-      x(i) = math::plus_dot(belief.x(i), &slope(i - O, 0), shift.data(), O);
-    }
+  for (int i = 0; i < O; ++i) {
+    shift(i) = dot(&root(i, 0), posterior.y.data(), i + 1);
+    x(i) = belief.x(i) + shift(i);
+  }
+  AUVEST_UNROLL
+  for (int i = O; i < N; ++i) {
+    x(i) = math::plus_dot(belief.x(i), &slope(i - O, 0), shift.data(), O);
   }
   const math::Mask<Value> finite = math::all_finite(x);
   if (!any(finite)) return finite;

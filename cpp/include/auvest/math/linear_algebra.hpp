@@ -54,14 +54,17 @@ AUVEST_OUTLINE AUVEST_INLINE void add_scaled(Value scale, const Value* x, Value*
   for (int i = 0; i < count; ++i) y[i] = y[i] + scale * x[i];
 }
 
+/// Fills an array with zeros.
+template <class Value>
+AUVEST_OUTLINE AUVEST_INLINE void set_zero(Value* a, int count) {
+  AUVEST_UNROLL
+  for (int i = 0; i < count; ++i) a[i] = Value(0);
+}
+
 /// Fills a matrix with zeros.
 template <class Value, int Rows, int Cols>
 AUVEST_INLINE void set_zero(Matrix<Value, Rows, Cols>& a) {
-  AUVEST_UNROLL
-  for (int i = 0; i < Rows; ++i) {
-    AUVEST_UNROLL
-    for (int j = 0; j < Cols; ++j) a(i, j) = Value(0);
-  }
+  set_zero(a.data(), Rows * Cols);
 }
 
 /// to = from. (Eigen's assignment is written out element by element, which takes flash.)
@@ -72,8 +75,7 @@ inline void copy(const Matrix<Scalar, Rows, Cols>& from, Matrix<Scalar, Rows, Co
 
 template <class Scalar, int N>
 inline void copy(const Belief<Scalar, N>& from, Belief<Scalar, N>& to) {
-  copy(from.x, to.x);
-  copy(from.P, to.P);
+  std::memcpy(static_cast<void*>(&to), &from, sizeof to);
 }
 
 /// to = from in the lanes of `where`.
@@ -99,9 +101,11 @@ AUVEST_INLINE void copy_where(const Mask<Value>& where, const Belief<Value, N>& 
 }
 
 /// Copies the lower triangle onto the upper one.
-template <class Scalar, int N>
-inline void mirror_lower(Matrix<Scalar, N, N>& a) {
+template <class Value, int N>
+AUVEST_INLINE void mirror_lower(Matrix<Value, N, N>& a) {
+  AUVEST_UNROLL
   for (int i = 1; i < N; ++i) {
+    AUVEST_UNROLL
     for (int j = 0; j < i; ++j) a(j, i) = a(i, j);
   }
 }

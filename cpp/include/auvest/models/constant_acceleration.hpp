@@ -80,7 +80,7 @@ struct ConstantAcceleration : ProcessModel<ConstantAcceleration<Scalar_, Order>,
     AUVEST_UNROLL
     for (int i = 0; i < 6; ++i) {
       Value* const row = &p(i, 0);
-      const int count = i + 1 + 2 * Order < 6 ? i + 1 + 2 * Order : 6;
+      const int count = Order == 1 || i == 0 ? i + 1 + 2 * Order : 6;  // of those that change
       if (i < 4) math::add_scaled(Value(c.first), row + 12, row, count);
       if (Order == 2 && i < 2) math::add_scaled(Value(c.second), row + 24, row, count);
       advance(row, i + 1, c);
