@@ -167,12 +167,13 @@ TARGETS = (
     _host("g++", "-O3", "-march=native"),
     _host("clang++", "-O0"),
     _host("clang++", "-O3", "-march=native"),
-    # As the Arduino IDE compiles a sketch, with the library's float routines; and with avr-libc's.
+    # As the Arduino IDE compiles a sketch, with the library's assembler routines; and without them.
     _avr(
         "atmega2560-ide",
         *("-Os", "-flto", "-fuse-linker-plugin", "-fpermissive", "-fno-threadsafe-statics"),
         *("-ffunction-sections", "-fdata-sections", "-Wl,--gc-sections"),
-        library=(ROOT / "firmware" / "library" / "src" / "avr_float.S",),
+        "-DAUVEST_ARDUINO_LIBRARY",
+        library=tuple(sorted((ROOT / "firmware" / "library" / "src").glob("*.S"))),
     ),
     _avr("atmega2560-O2", "-O2"),
     _cortex("cortex-m4f", "mps2-an386", "-mcpu=cortex-m4", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"),

@@ -59,3 +59,8 @@ static_assert(sizeof(float) == 4 && FLT_RADIX == 2 && FLT_MANT_DIG == 24,
 #else
 #define AUVEST_OUTLINE
 #endif
+
+// The Arduino library brings some routines in assembler; without its sources they are C++.
+#if defined(AUVEST_ARDUINO_LIBRARY) && defined(__AVR_HAVE_MUL__) && defined(__AVR_HAVE_JMP_CALL__)
+#define AUVEST_AVR_KERNELS
+#endif

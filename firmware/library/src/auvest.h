@@ -2,4 +2,5 @@
 // Arduino expects it.
 #pragma once
 
+#define AUVEST_ARDUINO_LIBRARY  // the assembler sources beside this file take part
 #include "auvest/auvest.hpp"

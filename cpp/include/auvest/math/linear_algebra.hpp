@@ -17,6 +17,32 @@
 namespace auvest {
 namespace math {
 
+#if defined(AUVEST_AVR_KERNELS)
+// The row kernels of float in assembler: firmware/library/src/avr_kernels.S.
+float plus_dot(float start, const float* u, const float* v,
+               uint8_t count) __asm__("auvest_plus_dot");
+float minus_dot(float start, const float* u, const float* v,
+                uint8_t count) __asm__("auvest_minus_dot");
+float dot(const float* u, const float* v, uint8_t count) __asm__("auvest_dot");
+void add_scaled(float scale, const float* x, float* y, uint8_t count) __asm__("auvest_add_scaled");
+bool all_finite(const float* a, uint8_t count) __asm__("auvest_all_finite");
+inline float plus_dot(float start, const float* u, const float* v, int count) {
+  return plus_dot(start, u, v, static_cast<uint8_t>(count));
+}
+inline float minus_dot(float start, const float* u, const float* v, int count) {
+  return minus_dot(start, u, v, static_cast<uint8_t>(count));
+}
+inline float dot(const float* u, const float* v, int count) {
+  return dot(u, v, static_cast<uint8_t>(count));
+}
+inline void add_scaled(float scale, const float* x, float* y, int count) {
+  add_scaled(scale, x, y, static_cast<uint8_t>(count));
+}
+inline bool all_finite(const float* a, int count) {
+  return all_finite(a, static_cast<uint8_t>(count));
+}
+#endif
+
 /// start + sum_i u[i] v[i], in the order of i.
 template <class Value>
 AUVEST_OUTLINE AUVEST_INLINE Value plus_dot(Value start, const Value* u, const Value* v,
@@ -44,7 +70,7 @@ AUVEST_OUTLINE AUVEST_INLINE Value dot(const Value* u, const Value* v, int count
 /// u x v in the plane.
 template <class Value>
 AUVEST_OUTLINE AUVEST_INLINE Value cross(const Value* u, const Value* v) {
-  return u[0] * v[1] - u[1] * v[0];
+  return minus_dot(u[0] * v[1], u + 1, v, 1);
 }
 
 /// y[i] += scale x[i].
@@ -126,6 +152,7 @@ AUVEST_OUTLINE AUVEST_INLINE Mask<Value> all_finite(const Value* a, int count) {
 /// True if every element is finite.
 template <class Value, int Rows, int Cols>
 AUVEST_INLINE Mask<Value> all_finite(const Matrix<Value, Rows, Cols>& a) {
+  static_assert(sizeof(int) > 2 || Rows * Cols < 256, "an 8-bit chip counts to 255");
   return all_finite(a.data(), Rows * Cols);
 }
 

@@ -20,6 +20,19 @@ namespace auvest {
 namespace math {
 namespace detail {
 
+/// A fraction of a turn in units of 2^-64 turn.
+struct Turn {
+  uint32_t low, high;
+};
+
+#if defined(AUVEST_AVR_KERNELS)
+
+// The functions of the other branch in assembler: firmware/library/src/avr_angle.S.
+Turn fraction_of_turn(float x) __asm__("auvest_fraction_of_turn");
+float turn_to_radian(Turn turn) __asm__("auvest_turn_to_radian");
+
+#else
+
 /// product = m a modulo 2^96, both of 12 bytes, most significant byte first. (By bytes: wider
 /// integers take much flash on an 8-bit chip.)
 inline void multiply(const uint8_t* a, uint32_t m, uint8_t* product) {
@@ -43,11 +56,6 @@ AUVEST_OUTLINE inline uint32_t word_of(const uint8_t* bytes) {
   return word;
 }
 
-/// A fraction of a turn in units of 2^-64 turn.
-struct Turn {
-  uint32_t high, low;
-};
-
 /// x / (2 pi) modulo 1 for a finite x >= 0.5. Error below 3 units.
 ///
 /// x = m 2^e with a 24-bit integer m. Digits of 1/(2 pi) that meet m above the binary point make
@@ -62,7 +70,7 @@ inline Turn fraction_of_turn(float x) {
   const uint32_t m = ((bits & 0x007fffffu) | 0x00800000u) << (first & 7u);
   uint8_t product[12];
   multiply(kDigits + (first >> 3), m, product);
-  return {word_of(product), word_of(product + 4)};
+  return {word_of(product + 4), word_of(product)};
 }
 
 /// The angle, in rad, of a signed fraction of a turn that is not zero (no float comes closer to a
@@ -91,6 +99,8 @@ inline float turn_to_radian(Turn turn) {
   const uint32_t rounded = (product >> 8) + ((product & 0x80u) != 0 ? 1u : 0u);
   return from_bits(sign | ((static_cast<uint32_t>(exponent - 1) << 23) + rounded));
 }
+
+#endif
 
 /// sin(x) for |x| <= pi/4. The sign of a zero is lost.
 template <class Value>
