@@ -77,12 +77,12 @@ struct MahalanobisInterval {
     Steps steps;
     for (int i = 0; i < 2; ++i) {
       const Scalar error = m.last_estimate(i) - m.last_reference(i);
-      steps.a[i] = step(m.last_estimate(i), filter.x()(i));
-      steps.b[i] = step(m.last_reference(i), reference(i));
-      steps.c[i] = (m.last_estimate(i) - m.last_reference(i)) + error;
+      steps[0][i] = step(m.last_estimate(i), filter.x()(i));
+      steps[1][i] = step(m.last_reference(i), reference(i));
+      steps[2][i] = (m.last_estimate(i) - m.last_reference(i)) + error;
     }
-    const Scalar aa = dot(steps.a, steps.a);
-    const Scalar bb = dot(steps.b, steps.b);
+    const Scalar aa = dot(steps[0], steps[0]);
+    const Scalar bb = dot(steps[1], steps[1]);
     m.ratio = clamp(bb / (aa + params.gamma1_m2), Scalar(0), params.ratio_max);  // Eq. (7)
     m.interval =
         clamp((Scalar(1) - m.tau) * params.scale * m.interval + m.tau * m.ratio * params.max_s,
@@ -117,12 +117,11 @@ struct MahalanobisInterval {
     return value > high ? high : value;
   }
 
-  /// The four points of Eq. (9), X(k), R(k), X(k-1) and R(k-1), without their mean.
-  struct Steps {
-    Scalar a[2];  // X(k) - X(k-1): its length is d_e of Eq. (7)
-    Scalar b[2];  // R(k) - R(k-1): its length is d_t
-    Scalar c[2];  // X(k) + X(k-1) - R(k) - R(k-1)
-  };
+  /// The four points of Eq. (9), X(k), R(k), X(k-1) and R(k-1), without their mean:
+  ///     a = X(k) - X(k-1)                      its length is d_e of Eq. (7)
+  ///     b = R(k) - R(k-1)                      its length is d_t
+  ///     c = X(k) + X(k-1) - R(k) - R(k-1)
+  using Steps = Scalar[3][2];
 
   /// Moves `last` to `now`, and says by how much.
   static Scalar step(Scalar& last, Scalar now) {
@@ -148,28 +147,29 @@ struct MahalanobisInterval {
   /// felt where the points are closer to a line than some sqrt(epsilon) of their spread (1e-3 in
   /// float), and nowhere else. If all four points coincide (or the squares of their distances
   /// under- or overflow), d^2 = 0.
-  static Scalar squared_distance(Steps& s, Scalar aa, Scalar bb) {
+  static Scalar squared_distance(Steps& steps, Scalar aa, Scalar bb) {
     using math::cross;
     const Scalar two = Scalar(2);
-    Scalar trace = two * (aa + bb) + dot(s.c, s.c);  // of 12 S
+    Scalar* const a = steps[0];
+    Scalar* const b = steps[1];
+    Scalar* const c = steps[2];
+    Scalar trace = two * (aa + bb) + dot(c, c);  // of 12 S
     // d^2 does not change with the unit of length: take one in which fourth powers fit.
     if (!(trace > Scalar(1e-8) && trace < Scalar(1e8))) {
       if (!math::is_positive(trace)) return Scalar(0);
       const Scalar unit = Scalar(1) / math::sqrt(trace);
-      for (int i = 0; i < 2; ++i) {
-        s.a[i] = s.a[i] * unit;
-        s.b[i] = s.b[i] * unit;
-        s.c[i] = s.c[i] * unit;
+      for (auto& step : steps) {
+        for (Scalar& component : step) component = component * unit;
       }
       trace = Scalar(1);
     }
-    const Scalar ab = two * cross(s.a, s.b);
-    const Scalar ac = cross(s.a, s.c);
-    const Scalar bc = cross(s.b, s.c);
-    const Scalar reach[2] = {two * s.a[0] + s.c[0], two * s.a[1] + s.c[1]};  // 4 (X(k) - mean)
+    const Scalar ab = two * cross(a, b);
+    const Scalar by_c[2] = {cross(a, c), cross(b, c)};
+    const Scalar sine = ab - by_c[1];
+    math::add_scaled(two, a, c, 2);  // 4 (X(k) - mean)
     const Scalar ridge = Scalar(0.5) * math::machine_epsilon<Scalar>() * trace;
-    const Scalar form = (Scalar(3) * (ac * ac) + (ab - bc) * (ab - bc)) + ridge * dot(reach, reach);
-    const Scalar determinant = (Scalar(0.5) * (ab * ab) + (ac * ac + bc * bc)) + ridge * trace;
+    const Scalar form = (Scalar(3) * (by_c[0] * by_c[0]) + sine * sine) + ridge * dot(c, c);
+    const Scalar determinant = (Scalar(0.5) * (ab * ab) + dot(by_c, by_c)) + ridge * trace;
     return Scalar(0.75) * (form / determinant);  // Eq. (11)
   }
 };
