@@ -122,9 +122,9 @@ AUVEST_OUTLINE AUVEST_INLINE math::Mask<Value> potter(Matrix<Value, M, O>& a,
     AUVEST_UNROLL
     for (int k = 0; k < O; ++k) f(k) = math::dot(&g(k, 0), row, O);
     const Value spread = math::plus_dot(noise(m, m), f.data(), f.data(), O);
-    const Value gamma = Value(1) / (spread + sqrt(noise(m, m) * spread));
+    const Value minus_gamma = Value(-1) / (spread + sqrt(noise(m, m) * spread));
     // f and with it all that follows from it is bounded by these two.
-    finite = finite && is_finite(spread) && is_finite(gamma);
+    finite = finite && is_finite(spread) && is_finite(minus_gamma);
     noise(m, m) = spread;
     const Value surprise = math::minus_dot(residual(m), row, y.data(), O);
     const Value step = surprise / spread;
@@ -135,9 +135,9 @@ AUVEST_OUTLINE AUVEST_INLINE math::Mask<Value> potter(Matrix<Value, M, O>& a,
     for (int k = 0; k < O; ++k) add_scaled(f(k), &g(k, 0), v.data(), O);
     add_scaled(step, v.data(), y.data(), O);
     AUVEST_UNROLL
-    for (int k = 0; k < O; ++k) v(k) = v(k) * gamma;
+    for (int k = 0; k < O; ++k) v(k) = v(k) * minus_gamma;
     AUVEST_UNROLL
-    for (int k = 0; k < O; ++k) add_scaled(-f(k), v.data(), &g(k, 0), O);
+    for (int k = 0; k < O; ++k) add_scaled(f(k), v.data(), &g(k, 0), O);
   }
   return finite && is_finite(posterior.nis);
 }

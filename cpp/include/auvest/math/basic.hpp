@@ -60,7 +60,9 @@ AUVEST_INLINE double copy_sign(double x, double y) { return std::copysign(x, y);
 AUVEST_INLINE bool is_nan(float x) { return (to_bits(x) & 0x7fffffffu) > 0x7f800000u; }
 AUVEST_INLINE bool is_nan(double x) { return x != x; }
 
-AUVEST_INLINE bool is_finite(float x) { return (to_bits(x) & 0x7f800000u) != 0x7f800000u; }
+AUVEST_INLINE bool is_finite(float x) {
+  return (leading(to_bits(x)) & leading(0x7f800000u)) != leading(0x7f800000u);
+}
 AUVEST_INLINE bool is_finite(double x) { return absolute(x) <= DBL_MAX; }
 
 /// True if low <= value <= high; false for a NaN.
@@ -77,7 +79,7 @@ AUVEST_INLINE bool is_nonnegative(Scalar value) {
 
 /// True if 0 < value, not subnormal, and finite.
 AUVEST_INLINE bool is_positive(float value) {
-  return to_bits(value) - 0x00800000u < 0x7f800000u - 0x00800000u;
+  return leading(to_bits(value)) - leading(0x00800000u) < leading(0x7f800000u - 0x00800000u);
 }
 template <class Scalar>
 AUVEST_INLINE bool is_positive(Scalar value) {

@@ -23,5 +23,11 @@ AUVEST_INLINE float from_bits(uint32_t bits) {
   return x;
 }
 
+/// A bit pattern from its sign on as far as an unsigned int goes: all of it, or, in half of the
+/// work, the half that tells an 8-bit chip the exponent.
+constexpr unsigned leading(uint32_t bits) {
+  return static_cast<unsigned>(bits >> (32 - 8 * (sizeof(unsigned) < 4 ? sizeof(unsigned) : 4)));
+}
+
 }  // namespace math
 }  // namespace auvest

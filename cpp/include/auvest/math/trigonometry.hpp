@@ -361,8 +361,8 @@ AUVEST_OUTLINE AUVEST_INLINE float atan2(float y, float x) {
   float z = small / large;
   if (is_nan(z)) {
     if (!(small == large)) return quiet_nan();
-    z = to_bits(small) != 0 ? 1.0f : 0.0f;                       // two infinities or two zeros
-  } else if (to_bits(z) < 0x0d800000u && to_bits(small) != 0) {  // 2^-100
+    z = to_bits(small) != 0 ? 1.0f : 0.0f;  // two infinities or two zeros
+  } else if (leading(to_bits(z)) < leading(0x0d800000u) && to_bits(small) != 0) {  // 2^-100
     // Where the quotient would be subnormal not every target rounds it correctly; a product it
     // does.
     z = small / (large * 5.96046448e-08f) * 5.96046448e-08f;  // 2^-24
