@@ -60,6 +60,15 @@ static_assert(sizeof(float) == 4 && FLT_RADIX == 2 && FLT_MANT_DIG == 24,
 #define AUVEST_OUTLINE
 #endif
 
+// The same for the functions with most of the arithmetic. They go to a section of their own, which
+// lies behind the float routines while all else lies before them: a call over less than 4 KiB takes
+// half of the flash.
+#if defined(__AVR__)
+#define AUVEST_OUTLINE_HOT __attribute__((noinline, noclone, hot))
+#else
+#define AUVEST_OUTLINE_HOT
+#endif
+
 // The Arduino library brings some routines in assembler; without its sources they are C++.
 #if defined(AUVEST_ARDUINO_LIBRARY) && defined(__AVR_HAVE_MUL__) && defined(__AVR_HAVE_JMP_CALL__)
 #define AUVEST_AVR_KERNELS

@@ -7,7 +7,7 @@
 ; A in r25:r22, B in r21:r18, result in r25:r22; r0, r18-r27, r30, r31 and T may change, r1 is zero.
 #if defined(__AVR__) && defined(__AVR_HAVE_MUL__) && defined(__AVR_HAVE_JMP_CALL__)
 
-        .section .text.auvest_float, "ax", @progbits
+        .text                           ; before .text.*, where gcc puts what is hot
 
 ; ---- A * B ----
 

@@ -7,7 +7,7 @@
 
 #if defined(__AVR__) && defined(__AVR_HAVE_MUL__) && defined(__AVR_HAVE_JMP_CALL__)
 
-        .section .text.auvest_kernels, "ax", @progbits
+        .text                           ; before .text.*, where gcc puts what is hot
 
 ; float plus_dot(float start, const float* u, const float* v, count)   start + sum u v
 ; float minus_dot(float start, const float* u, const float* v, count)  start - sum u v

@@ -132,7 +132,7 @@ class GaussianFilter {
   const Derived& derived() const { return static_cast<const Derived&>(*this); }
 
   template <class Model>
-  AUVEST_OUTLINE AUVEST_INLINE Status
+  AUVEST_OUTLINE_HOT AUVEST_INLINE Status
   linearise(const typename Model::Measurement& z, const Model& model,
             const Matrix<Scalar, Model::kObserved, Model::kObserved>& root,
             Correction<Scalar, Model::kSize>& correction,

@@ -31,12 +31,11 @@ class Ukf : public GaussianFilter<Ukf<Process>, Process> {
   }
 
   template <class Model, class Point>
-  AUVEST_OUTLINE Status linearise(const Model& model, const Point& point,
-                                  const Matrix<Scalar, Model::kObserved, Model::kObserved>& root,
-                                  const typename Model::Measurement& z,
-                                  typename Model::Measurement& innovation,
-                                  Matrix<Scalar, Model::kSize, Model::kObserved>& a,
-                                  typename Model::Noise& noise) const {
+  AUVEST_OUTLINE_HOT Status
+  linearise(const Model& model, const Point& point,
+            const Matrix<Scalar, Model::kObserved, Model::kObserved>& root,
+            const typename Model::Measurement& z, typename Model::Measurement& innovation,
+            Matrix<Scalar, Model::kSize, Model::kObserved>& a, typename Model::Noise& noise) const {
     if (points_.fine && !Model::kClosedForm) return Status::kAlphaTooSmall;
     typename Model::Measurement predicted;
     math::copy(model.R(), noise);

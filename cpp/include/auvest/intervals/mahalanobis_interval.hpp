@@ -72,7 +72,7 @@ struct MahalanobisInterval {
   }
 
   template <class Filter>
-  AUVEST_OUTLINE Scalar next(const Filter& filter, const Position& reference) {
+  AUVEST_OUTLINE_HOT Scalar next(const Filter& filter, const Position& reference) {
     Memory& m = memory;
     Steps steps;
     for (int i = 0; i < 2; ++i) {
