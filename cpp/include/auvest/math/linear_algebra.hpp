@@ -205,7 +205,7 @@ struct DropLostPivots {
 /// element of `a` is not positive (or is NaN), or a pivot is below `least` times it.
 template <class LostPivots = RaiseLostPivots, class Value>
 AUVEST_OUTLINE AUVEST_INLINE Mask<Value> ldlt(Value* a, int n, Value least, Value* inverse) {
-  Mask<Value> definite = *a > Value(0);
+  Mask<Value> definite = Value(0) < Value(1);  // so far
   Value* row = a;
   AUVEST_UNROLL
   for (int i = 0; i < n; ++i) {
