@@ -10,6 +10,8 @@
 //         (see square_root_update.hpp)
 #pragma once
 
+#include <cstring>
+
 #include "auvest/filters/square_root_update.hpp"
 #include "auvest/math/linear_algebra.hpp"
 #include "auvest/status.hpp"
@@ -142,9 +144,8 @@ class GaussianFilter {
     if (!correction.near_field) {
       return derived().linearise(model, point, root, z, correction.innovation, a, noise);
     }
-    for (int m = 0; m < Model::kSize; ++m) {  // a measurement of the observed states themselves
-      for (int k = 0; k < Model::kObserved; ++k) a(m, k) = k <= m ? root(m, k) : Scalar(0);
-    }
+    // A measurement of the observed states themselves, of the same number: A is their root.
+    std::memcpy(a.data(), root.data(), sizeof a < sizeof root ? sizeof a : sizeof root);
     return Status::kOk;
   }
 
