@@ -3,6 +3,7 @@
 import subprocess
 
 import numpy as np
+import pytest
 
 pytest_plugins = ["board_support"]
 
@@ -132,3 +133,13 @@ def test_the_board_has_the_bits_of_the_host(compile_avr, run_board, root, tmp_pa
     assert wrong.size == 0, f"{wrong.size} wrong, first: row and place {divmod(wrong[0], per_row)}"
     wrong = np.flatnonzero(found[size:] != true[size:])
     assert wrong.size == 0, f"{wrong.size} wrong, first: {turns[wrong[0] // 4]} at {wrong[0] % 4}"
+
+
+@pytest.mark.parametrize("compiler", ["arm-none-eabi-gcc", "gcc"])
+def test_other_chips_take_the_assembler_sources_as_empty(compiler, root, tmp_path):
+    """Arduino compiles every source of a library for every board."""
+    sources = sorted((root / "firmware/library/src").glob("*.S"))
+    assert sources
+    for source in sources:
+        command = [compiler, "-c", "-x", "assembler-with-cpp", source, "-o", tmp_path / "empty.o"]
+        subprocess.run(command, check=True)

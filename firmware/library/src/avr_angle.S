@@ -1,9 +1,9 @@
+#if defined(__AVR__) && defined(__AVR_HAVE_MUL__) && defined(__AVR_HAVE_JMP_CALL__)
+
 ; Large angles for AVR chips with a hardware multiplier: fraction_of_turn() and turn_to_radian() of
 ; auvest/math/trigonometry.hpp, bit for bit, in less than half the flash.
 ;
 ; A fraction of a turn is r25:r18, in units of 2^-64 turn; floats are in r25:r22.
-
-#if defined(__AVR__) && defined(__AVR_HAVE_MUL__) && defined(__AVR_HAVE_JMP_CALL__)
 
         .section .progmem.data.auvest_angle, "a", @progbits
 

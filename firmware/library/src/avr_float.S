@@ -1,3 +1,5 @@
+#if defined(__AVR__) && defined(__AVR_HAVE_MUL__) && defined(__AVR_HAVE_JMP_CALL__)
+
 ; Multiplication, addition and subtraction of floats for AVR chips with a hardware multiplier: the
 ; bits of avr-libc's own, in three quarters of the cycles.
 ;
@@ -5,8 +7,6 @@
 ; operands with a normal result, rounded to nearest, ties to even; zeros, subnormals, infinities, NaN
 ; and results near the ends of the range go to avr-libc. Arguments and result as avr-gcc has them:
 ; A in r25:r22, B in r21:r18, result in r25:r22; r0, r18-r27, r30, r31 and T may change, r1 is zero.
-#if defined(__AVR__) && defined(__AVR_HAVE_MUL__) && defined(__AVR_HAVE_JMP_CALL__)
-
         .text                           ; before .text.*, where gcc puts what is hot
 
 ; ---- A * B ----

@@ -1,11 +1,11 @@
+#if defined(__AVR__) && defined(__AVR_HAVE_MUL__) && defined(__AVR_HAVE_JMP_CALL__)
+
 ; The row kernels of auvest/math/linear_algebra.hpp for AVR chips with a hardware multiplier: what
 ; they compute and in which order is said there. avr-gcc takes twice the flash for them.
 ;
 ; Arguments and results as avr-gcc has them: the first in r25:r22 (a float) or r25:r24 (a pointer),
 ; the next below, each from an even register; a count is a byte. Called routines may change r0,
 ; r18-r27, r30, r31 and T; r1 is zero.
-
-#if defined(__AVR__) && defined(__AVR_HAVE_MUL__) && defined(__AVR_HAVE_JMP_CALL__)
 
         .text                           ; before .text.*, where gcc puts what is hot
 
