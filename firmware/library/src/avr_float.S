@@ -1,133 +1,184 @@
 #if defined(__AVR__) && defined(__AVR_HAVE_MUL__) && defined(__AVR_HAVE_JMP_CALL__)
 
-; Multiplication, addition and subtraction of floats for AVR chips with a hardware multiplier: the
-; bits of avr-libc's own, in three quarters of the cycles.
+; Float arithmetic for AVR chips with a hardware multiplier: A + B, A - B, A * B, A / B and the root of
+; A, rounded as IEEE 754 says, to nearest and ties to even, with signed zeros, subnormal numbers,
+; infinities and NaN. The linker takes these routines in place of avr-libc's, which are larger and, but
+; for the root, slower, and which round subnormal quotients down. All share one beginning and one end.
 ;
-; The linker takes these in place of avr-libc's __mulsf3, __addsf3 and __subsf3. Here are only normal
-; operands with a normal result, rounded to nearest, ties to even; zeros, subnormals, infinities, NaN
-; and results near the ends of the range go to avr-libc. Arguments and result as avr-gcc has them:
-; A in r25:r22, B in r21:r18, result in r25:r22; r0, r18-r27, r30, r31 and T may change, r1 is zero.
+; Arguments and results as avr-gcc has them: A in r25:r22, B in r21:r18, result in r25:r22; r0,
+; r18-r27, r30, r31 and T may change, r1 is zero.
+
         .text                           ; before .text.*, where gcc puts what is hot
 
-; ---- A * B ----
+; ---- Operands ----
 
-multiply_by_library:
-        call    __mulsf3x
-        jmp     __fp_round
+        .global __divsf3
+        .type   __divsf3, @function
+__divsf3:
+        ldi     r27, 0x80
+        rjmp    unpack
+
+        .global sqrt
+        .type   sqrt, @function
+        .global sqrtf
+        .type   sqrtf, @function
+sqrt:
+sqrtf:
+        ldi     r27, 0xa0
+        ldi     r21, 0x3f               ; at first as A / 1
+        ldi     r20, 0x80
+        rjmp    unpack
+
+1:      set                             ; special A: zero or subnormal, infinite or NaN
+        breq    3f
+        clr     r25
+        rjmp    3f
+2:      set                             ; special B
+        breq    4f
+        clr     r21
+        rjmp    4f
 
         .global __mulsf3
         .type   __mulsf3, @function
 __mulsf3:
-        ; Exponents: r26 of A, r30 of B; 0 and 255 are not for us.
-        mov     r26, r25
-        mov     r27, r24
-        lsl     r27
-        rol     r26
-        breq    multiply_by_library
-        cpi     r26, 0xff
-        breq    multiply_by_library
-        mov     r30, r21
-        mov     r27, r20
-        lsl     r27
-        rol     r30
-        breq    multiply_by_library
-        cpi     r30, 0xff
-        breq    multiply_by_library
-        ; r27:r26 = that of the product, if its mantissa is below 2: 1..253 is for us.
+        ldi     r27, 1
+; What each operation (r27: 0 add, 1 multiply, 0x80 divide, 0xa0 root) starts from:
+; - A's exponent - 1 in r25, its mantissa with the hidden bit in r24:r22; B's in r21 and r20:r18.
+;   A subnormal number and zero have the exponent of the smallest normal ones and no hidden bit,
+;   infinity and NaN have 254 and none;
+; - the sign of A in bit 7 of r31, that of A * B in bit 7 of r30;
+; - T if A or B is special.
+unpack:
+        clt
+        mov     r31, r25
+        mov     r30, r25
+        eor     r30, r21
+        lsl     r24
+        rol     r25
+        dec     r25
+        cpi     r25, 254                ; C: a normal number's hidden bit
+        brsh    1b
+3:      ror     r24
+        lsl     r20
+        rol     r21
+        dec     r21
+        cpi     r21, 254
+        brsh    2b
+4:      ror     r20
+        brts    5f
+        sbrs    r27, 0                  ; a product of normal numbers stays here
+5:      rjmp    divide
+
+; ---- A * B ----
+
+multiply:
+        bst     r30, 7
         clr     r27
-        add     r26, r30
-        adc     r27, r1
-        subi    r26, 127
+        mov     r26, r25
+        add     r26, r21
+        adc     r27, r27
+        subi    r26, 125
         sbci    r27, 0
-        tst     r27                     ; (sbci leaves Z clear if r26 is not 0)
-        brne    multiply_by_library
-        cpi     r26, 254
-        brsh    multiply_by_library
-        tst     r26
-        breq    multiply_by_library
-        ; Sign to T, hidden bits in place.
-        eor     r25, r21
-        bst     r25, 7
-        ori     r24, 0x80
-        ori     r20, 0x80
-        ; r18:r22:r31:r30:r27:r21 = (r24:r23:r22) * (r20:r19:r18), 48 bits.
-        clr     r25
+        ; r24:r23:r22:r25:r31:r30 = (r24:r23:r22) * (r20:r19:r18)
         mul     r22, r18
-        mov     r21, r0
-        mov     r27, r1
-        mul     r22, r20
         movw    r30, r0
         mul     r22, r19
-        add     r27, r0
-        adc     r30, r1
-        adc     r31, r25
+        add     r31, r0
+        clr     r25
+        adc     r25, r1
+        mul     r22, r20
+        add     r25, r0
         clr     r22
+        adc     r22, r1
+        clr     r21
         mul     r23, r18
-        add     r27, r0
-        adc     r30, r1
-        adc     r31, r25
+        add     r31, r0
+        adc     r25, r1
+        adc     r22, r21
         mul     r24, r18
-        add     r30, r0
-        adc     r31, r1
-        adc     r22, r25
+        add     r25, r0
+        adc     r22, r1
+        adc     r21, r21
         clr     r18
         mul     r23, r19
-        add     r30, r0
-        adc     r31, r1
-        adc     r22, r25
+        add     r25, r0
+        adc     r22, r1
+        adc     r21, r18
         mul     r23, r20
-        add     r31, r0
-        adc     r22, r1
-        adc     r18, r25
-        mul     r24, r19
-        add     r31, r0
-        adc     r22, r1
-        adc     r18, r25
-        mul     r24, r20
         add     r22, r0
+        adc     r21, r1
+        adc     r18, r18
+        clr     r23
+        mul     r24, r19
+        add     r22, r0
+        adc     r21, r1
+        adc     r18, r23
+        mul     r24, r20
+        add     r21, r0
         adc     r18, r1
-        clr     r1
-        ; The leading one is bit 47, or bit 46: then shift.
-        tst     r18
-        brmi    1f
-        lsl     r27
-        rol     r30
-        rol     r31
-        rol     r22
-        rol     r18
-        dec     r26
-1:      inc     r26
-        ; Mantissa r18:r22:r31; the half is bit 7 of r30, below it r30:r27:r21.
-        lsl     r30
-        brcc    3f
-        or      r27, r21
-        or      r27, r30
-        brne    2f
-        sbrs    r31, 0
-        rjmp    3f
-2:      subi    r31, 0xff
-        sbci    r22, 0xff
-        sbci    r18, 0xff
-        brcs    3f
-        inc     r26                     ; 1.11..1 became 10.0
-3:      lsl     r18                     ; the hidden bit out, the last bit of the exponent in
-        lsr     r26
-        ror     r18
-        bld     r26, 7
-        mov     r23, r22
-        mov     r22, r31
+        mov     r23, r21
         mov     r24, r18
+        clr     r1
+
+; ---- Result ----
+
+; Mantissa r24:r22 and below it r25, r31, r30; exponent - 1 in r27:r26, of any size; sign in T.
+normalise:
+        tst     r24
+        brmi    in_range
+1:      sbiw    r26, 1
+        brmi    4f
+        lsl     r30
+        rol     r31
+        rol     r25
+        rol     r22
+        rol     r23
+        rol     r24
+        brpl    1b
+in_range:
+        cpi     r26, 254
+        cpc     r27, r1
+        brlo    round
+        sbrs    r27, 7
+        rjmp    infinity
+3:      or      r31, r25                ; the exponent rises to 1: a subnormal number
+        lsr     r24
+        ror     r23
+        ror     r22
+        ror     r25
+4:      adiw    r26, 1
+        brne    3b
+round:
+        lsl     r24                     ; the hidden bit makes exponent - 1 the exponent
+        adc     r26, r1
+        lsr     r26
+        ror     r24
+        lsl     r25                     ; C: the half
+        brcc    sign
+        or      r25, r31
+        or      r25, r30
+        sbrc    r22, 0
+        clz
+        breq    sign                    ; a tie, and even
+        subi    r22, 0xff
+        sbci    r23, 0xff
+        sbci    r24, 0xff
+        sbci    r26, 0xff               ; (the largest number becomes infinity)
+sign:   bld     r26, 7
         mov     r25, r26
         ret
-        .size   __mulsf3, . - __mulsf3
 
-; ---- A - B, A + B ----
+; ---- A + B ----
 
-add_by_library:
-        clr     r27
-        clr     r26
-        call    __addsf3x
-        jmp     __fp_round
+; The same as unpack, here once more: a jump less for what a filter does most.
+21:     set                             ; special A
+        breq    23f
+        clr     r25
+        rjmp    23f
+22:     set                             ; special B
+        breq    24f
+        clr     r21
+        rjmp    24f
 
         .global __subsf3
         .type   __subsf3, @function
@@ -136,27 +187,28 @@ __subsf3:
         .global __addsf3
         .type   __addsf3, @function
 __addsf3:
-        ; Exponents: r27 of A, r31 of B.
-        mov     r30, r24
-        lsl     r30
-        mov     r27, r25
-        rol     r27
-        breq    add_by_library
-        cpi     r27, 0xff
-        breq    add_by_library
-        mov     r30, r20
-        lsl     r30
-        mov     r31, r21
-        rol     r31
-        breq    add_by_library
-        cpi     r31, 0xff
-        breq    add_by_library
-        ; Make A the larger in size. (Of the mantissas only the last 23 bits may be compared: the
-        ; eighth bit of r24 and r20 belongs to the exponents, which decide before it does.)
+        clr     r27
+        clt
+        mov     r31, r25
+        mov     r30, r25
+        eor     r30, r21
+        lsl     r24
+        rol     r25
+        dec     r25
+        cpi     r25, 254                ; C: a normal number's hidden bit
+        brsh    21b
+23:     ror     r24
+        lsl     r20
+        rol     r21
+        dec     r21
+        cpi     r21, 254
+        brsh    22b
+24:     ror     r20
+order:                                  ; A becomes the larger in size
         cp      r22, r18
         cpc     r23, r19
         cpc     r24, r20
-        cpc     r27, r31
+        cpc     r25, r21
         brsh    1f
         movw    r0, r22
         movw    r22, r18
@@ -164,129 +216,278 @@ __addsf3:
         movw    r0, r24
         movw    r24, r20
         movw    r20, r0
-        mov     r0, r27
-        mov     r27, r31
-        mov     r31, r0
         clr     r1
-1:      cpi     r27, 32                 ; cancellation of 24 bits leaves a normal number
-        brlo    add_by_library
-        mov     r26, r27
-        sub     r26, r31
-        cpi     r26, 26
-        brlo    2f
-        ret                             ; B is below half of A's last place: A stays
-2:      bst     r25, 7                  ; sign of the result; r25 says whether the signs differ
-        eor     r25, r21
-        ori     r24, 0x80
-        ori     r20, 0x80
-        ; B >> r26: mantissa r20:r19:r18, guard byte r21, sticky r30.
-        clr     r21
-        clr     r30
-3:      cpi     r26, 8
-        brlo    4f
-        or      r30, r21
+        eor     r31, r30
+1:      brts    special
+add:
+        bst     r31, 7
+        mov     r26, r25
+        sub     r25, r21
+        clr     r21                     ; below the mantissa of B
+        clr     r31                     ; not zero if anything fell out below r21
+        ; B >> r25, by bytes and by bits.
+2:      cpi     r25, 8
+        brlo    5f
+        cpi     r25, 26
+        brsh    3f
+        cp      r1, r21
+        sbci    r31, 0
         mov     r21, r18
         mov     r18, r19
         mov     r19, r20
         clr     r20
-        subi    r26, 8
-        rjmp    3b
-4:      subi    r26, 1
-        brcs    5f
-        ; By 1 to 7 bits: times r31 = 2^(8 - bits), and the upper byte of each product.
-        ldi     r31, 0x80
-        sbrc    r26, 1
-        ldi     r31, 0x20
-        sbrc    r26, 0
-        lsr     r31
-        sbrc    r26, 2
-        swap    r31
-        mul     r21, r31
-        or      r30, r0
-        mov     r21, r1
-        mul     r18, r31
-        or      r21, r0
-        mov     r18, r1
-        mul     r19, r31
-        or      r18, r0
-        mov     r19, r1
-        mul     r20, r31
-        or      r19, r0
-        mov     r20, r1
-        clr     r1
-5:      sbrc    r25, 7
-        rjmp    20f
-        ; Same signs.
+        subi    r25, 8
+        rjmp    2b
+4:      lsr     r20
+        ror     r19
+        ror     r18
+        ror     r21
+        sbci    r31, 0
+5:      dec     r25
+        brpl    4b
+        clr     r25                     ; below the mantissa of A
+        sbrc    r30, 7
+        rjmp    6f
+        clr     r30
+        mov     r25, r21
         add     r22, r18
         adc     r23, r19
         adc     r24, r20
-        brcc    10f
+        brcc    7f
+        or      r31, r25
         ror     r24
         ror     r23
         ror     r22
-        ror     r21
-        brcc    6f
-        ori     r30, 1
-6:      inc     r27
-        cpi     r27, 0xff
-        brne    10f
-        clr     r24                     ; infinity
-        clr     r23
-        clr     r22
-        rjmp    12f
-        ; Different signs: A - B, from the sticky byte up.
-20:     neg     r30
-        ldi     r26, 0
-        sbc     r26, r21
-        mov     r21, r26
+        ror     r25
+        adiw    r26, 1
+        rjmp    in_range
+6:      clr     r30
+        cp      r1, r31
+        sbc     r25, r21
         sbc     r22, r18
         sbc     r23, r19
         sbc     r24, r20
-        tst     r24
-        brmi    10f
-        brne    22f
-        cpi     r23, 0
-        brne    21f
-        mov     r26, r22
-        or      r26, r21
-        breq    30f
-21:     mov     r24, r23                ; by whole bytes
-        mov     r23, r22
-        mov     r22, r21
-        clr     r21
-        subi    r27, 8
-        tst     r24
-        breq    21b
-        brmi    10f
-22:     lsl     r21                     ; by bits
-        rol     r22
+        brmi    7f
+        brne    8f
+        ret                             ; A - A = +0
+3:      lsr     r25                     ; B is below half of A's last place: A stays
+7:      rjmp    round
+8:      rjmp    normalise
+
+; ---- Zeros, subnormals, infinities, NaN ----
+
+; Sum or product; |A| >= |B|.
+special:
+        cpi     r25, 254
+        breq    1f
+        sbrs    r27, 0
+        rjmp    add
+        cp      r1, r18
+        cpc     r1, r19
+        cpc     r1, r20
+        brcs    multiply_subnormal
+        bst     r30, 7
+zero:   clr     r24
+        clr     r26
+        rjmp    4f
+1:      or      r22, r23
+        or      r22, r24
+        brne    nan
+        sbrc    r27, 0
+        rjmp    2f
+        bst     r31, 7
+        cpi     r21, 254
+        brne    infinity
+        sbrc    r30, 7
+        rjmp    nan
+        rjmp    infinity
+2:      bst     r30, 7
+        or      r18, r19
+        or      r18, r20
+        or      r18, r21
+        brne    infinity
+nan:    ldi     r24, 0xc0
+        rjmp    3f
+infinity:
+        ldi     r24, 0x80
+3:      ldi     r26, 0x7f
+4:      clr     r23
+        clr     r22
+        rjmp    sign
+multiply_subnormal:
+        rjmp    multiply
+
+; Quotient.
+divide_special:
+        cpi     r25, 254
+        breq    3f
+        cpi     r21, 254
+        breq    4f
+        cp      r1, r18
+        cpc     r1, r19
+        cpc     r1, r20
+        sbc     r26, r26                ; bit 7: B is not zero
+        cp      r1, r22
+        cpc     r1, r23
+        cpc     r1, r24
+        brcc    2f
+        sbrs    r26, 7
+1:      rjmp    infinity
+        rjmp    divide_normal
+2:      sbrs    r26, 7
+        rjmp    nan
+        rjmp    zero
+3:      or      r22, r23                ; infinity / B
+        or      r22, r24
+        brne    5f
+        cpi     r21, 254
+        breq    5f
+        sbrc    r27, 5
+        brts    5f
+        rjmp    infinity
+4:      or      r18, r19                ; A / infinity
+        or      r18, r20
+        breq    zero
+5:      rjmp    nan
+
+; ---- A / B ----
+
+divide:
+        sbrc    r27, 0
+        rjmp    order                   ; a special product
+        mov     r0, r27                 ; bit 5: root
+        bld     r27, 6
+        bst     r30, 7
+        sbrc    r27, 6
+        rjmp    divide_special
+divide_normal:
+        mov     r26, r25
+        sub     r26, r21
+        sbc     r27, r27
+        subi    r26, lo8(-126)
+        sbci    r27, hi8(-126)
+1:      tst     r24                     ; subnormal numbers
+        brmi    2f
+        sbiw    r26, 1
+        lsl     r22
         rol     r23
         rol     r24
-        dec     r27
-        tst     r24
-        brpl    22b
-        ; Round: the half is bit 7 of the guard byte.
-10:     lsl     r21
-        brcc    12f
-        or      r21, r30
-        brne    11f
-        sbrs    r22, 0
-        rjmp    12f
-11:     subi    r22, 0xff
-        sbci    r23, 0xff
-        sbci    r24, 0xff
-        brcs    12f
-        inc     r27
-12:     lsl     r24
-        lsr     r27
-        ror     r24
-        bld     r27, 7
-        mov     r25, r27
-        ret
-30:     clr     r25                     ; A - A = +0
-        clr     r24
-        clr     r23
+        rjmp    1b
+2:      sbrc    r0, 5
+        rjmp    root
+3:      tst     r20
+        brmi    4f
+        adiw    r26, 1
+        lsl     r18
+        rol     r19
+        rol     r20
+        rjmp    3b
+        ; The remainder is r21:r31:r30, at first A; r20:r18 = B - 1 is less if B is not more. Bits of the
+        ; quotient come in at r25, bytes at r22, until the first bit, which is 1, is at its place.
+4:      movw    r30, r22
+        mov     r21, r24
         clr     r22
-        ret
-        .size   __addsf3, . - __addsf3
+        clr     r23
+        ldi     r25, 1
+        subi    r18, 1
+        sbc     r19, r1
+        sbc     r20, r1
+        cp      r18, r30
+        cpc     r19, r31
+        cpc     r20, r21
+        brlo    6f
+        sbiw    r26, 1
+5:      lsl     r30
+        rol     r31
+        rol     r21
+        brcs    6f
+        cp      r18, r30
+        cpc     r19, r31
+        cpc     r20, r21
+        brsh    7f
+6:      sbc     r30, r18                ; with C: less B
+        sbc     r31, r19
+        sbc     r21, r20
+        sec
+7:      rol     r25
+        brcc    5b
+        mov     r24, r23
+        mov     r23, r22
+        mov     r22, r25
+        ldi     r25, 1
+        tst     r24
+        brpl    5b
+        ; The half: the remainder is more than what B - 1 is above it.
+        sub     r18, r30
+        sbc     r19, r31
+        sbc     r20, r21
+        cp      r18, r30
+        cpc     r19, r31
+        cpc     r20, r21
+        sbc     r25, r25
+        or      r31, r21
+        rjmp    in_range
+
+; ---- Root of A ----
+
+root:
+        brts    1f
+        clr     r25
+        ; Bit by bit. With P, the root so far, and b, the next bit: P + b / 2 in r20:r18 (1 is 0x80
+        ; in r20), b and b / 2 in r21:r31:r30, and the remainder by 2 b in r24:r22.
+        ldi     r20, 0xa0
+        clr     r19
+        clr     r18
+        ldi     r21, 0x60
+        movw    r30, r18
+        asr     r27
+        ror     r26
+        brcs    2f
+        subi    r24, 0x80               ; from 1 to 2, less the leading 1
+        rjmp    4f
+2:      subi    r24, 0x40               ; from 2 to 4, doubled next
+3:      lsl     r22
+        rol     r23
+        rol     r24
+        brcs    5f
+4:      cp      r22, r18
+        cpc     r23, r19
+        cpc     r24, r20
+        brlo    6f
+5:      sub     r22, r18
+        sbc     r23, r19
+        sbc     r24, r20
+        or      r18, r30
+        or      r19, r31
+        or      r20, r21
+6:      lsr     r21
+        ror     r31
+        ror     r30
+        eor     r18, r30
+        eor     r19, r31
+        eor     r20, r21
+        brcc    3b
+        ; The last bit and the half, which rounds (a root is no tie): b / 2 is below r18. r21 is 0.
+7:      lsl     r22
+        rol     r23
+        rol     r24
+        brcs    8f
+        cp      r18, r22
+        cpc     r19, r23
+        cpc     r20, r24
+        brcc    9f
+8:      sbc     r22, r18
+        sbc     r23, r19
+        sbc     r24, r20
+        subi    r18, 0xff
+        sbci    r19, 0xff
+        sbci    r20, 0xff
+9:      com     r21
+        brne    7b
+        movw    r22, r18
+        mov     r24, r20
+        subi    r26, lo8(-63)
+        rjmp    round
+
+1:      rjmp    nan
 #endif
