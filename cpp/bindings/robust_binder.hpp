@@ -266,7 +266,7 @@ class RobustBinder {
     py::dict state;
     state["x"] = to_array(filter.x());
     state["P"] = to_array(filter.P());
-    state["recovery"] = py::make_tuple(streak.count, streak.variance);
+    state["recovery"] = py::make_tuple(streak.count, streak.variance, to_array(streak.recent));
     return state;
   }
 
@@ -278,6 +278,7 @@ class RobustBinder {
     const auto recovery = state["recovery"].cast<py::tuple>();
     rule.recovery.streak.count = recovery[0].cast<std::uint8_t>();
     rule.recovery.streak.variance = recovery[1].cast<Scalar>();
+    rule.recovery.streak.recent = to_matrix<2, 3>(recovery[2].cast<Array<Scalar>>(), "recovery");
     require_ok(filter.restore(belief, rule));
   }
 };

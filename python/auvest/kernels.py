@@ -121,19 +121,20 @@ class Igg(Kernel):
 class RejectionStreak:
     """Recovery from lock-out: a streak of rejections widens the position's covariance.
 
-    A rejection counts 2 up, an acceptance 1 down; at ``2 * rejections`` the position variance grows
-    until the worst of the rejected innovations would stand at one sigma.
+    A rejection counts 4 up, or 7 if it repeats the innovation of a recent one seen along the same
+    line, or 1 if it contradicts that; an acceptance counts 2 down. At ``4 * rejections`` the
+    position variance grows until the worst of the rejected innovations would stand at one sigma.
 
     Parameters
     ----------
     rejections : int
-        Rejections in a row that it takes, 1..100.
+        Rejections in a row that it takes if none repeats another, 1..60.
     """
 
     rejections: int = _REJECTIONS
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "rejections", as_integer("rejections", self.rejections, 1, 100))
+        object.__setattr__(self, "rejections", as_integer("rejections", self.rejections, 1, 60))
 
 
 KernelName: TypeAlias = Literal["igg", "huber", "hampel", "unit"]

@@ -58,7 +58,7 @@ _POINTS = _core.sigma_points_defaults()
 _UPDATE = _core.robust_update_defaults()
 _LEADER = LeaderRange()
 _STREAK = RejectionStreak()
-_FORMAT = 1  # of save()
+_FORMAT = 2  # of save()
 
 
 @dataclass(frozen=True)
@@ -452,13 +452,14 @@ class RobustFilter:
                 )
         states = state_count(self._process)
         try:
-            count, variance = state["recovery"]
+            count, variance, recent = state["recovery"]
             core = {
                 "x": as_array("state['x']", state["x"], (states,), self._dtype),
                 "P": as_array("state['P']", state["P"], (states, states), self._dtype),
                 "recovery": (
-                    as_integer("state['recovery'][0]", count, 0, 200),
+                    as_integer("state['recovery'][0]", count, 0, 240),
                     as_number("state['recovery'][1]", variance, "not negative"),
+                    as_array("state['recovery'][2]", recent, (2, 3), self._dtype),
                 ),
             }
         except KeyError as error:

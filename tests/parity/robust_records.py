@@ -118,7 +118,7 @@ class RobustRecord:
                     row["decision"], row["iterations"] = int(r.decision), r.iterations
                     row["recovered"] = r.recovered
             row["x"], row["P"] = bits(f.x), bits(f.P[lower])
-            count, variance = f.save()["recovery"]
+            count, variance, _ = f.save()["recovery"]
             row["count"], row["variance"] = count, bits(variance)
         return trace
 

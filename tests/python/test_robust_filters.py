@@ -180,7 +180,7 @@ def test_odometry_turns_its_increments():
 @pytest.mark.parametrize("dtype", DTYPES)
 def test_a_copy_goes_on_with_the_same_bits_in_the_middle_of_a_streak(carry, dtype):
     f = slave(dtype=dtype)
-    for _ in range(4):
+    for _ in range(2):
         f.update(900.0, LeaderRange(leader=(300.0, 0.0)))
     assert f.report.decision == Decision.rejected
     g = carry(f)
@@ -225,7 +225,7 @@ CASES = {
     "k0": (lambda: auvest.Igg(k0=0.0), ValueError, "k0 must be positive"),
     "k1": (lambda: auvest.Igg(k1=1.0), ValueError, "k0 <= k1 is required, not k0=1.5, k1=1.0"),
     "hampel": (lambda: auvest.Hampel(c=math.inf), ValueError, "c must be finite"),
-    "rejections": (lambda: auvest.RejectionStreak(rejections=0), ValueError, r"1\.\.100, not 0"),
+    "rejections": (lambda: auvest.RejectionStreak(rejections=0), ValueError, r"1\.\.60, not 0"),
     "recovery": (lambda: slave(recovery=6), TypeError, "recovery must be an auvest.Reje"),
     "residual": (lambda: slave(residual="both"), ValueError, "residual must be 'innovation' or"),
     "iterations": (lambda: slave(max_iterations=1), ValueError, r"max_iterations .* 2\.\.255"),
@@ -285,7 +285,12 @@ CALLS = {
         ValueError,
         "position has 1 rows and z has 2",
     ),
-    "state": (lambda f: f.restore({"format": 0}), ValueError, "expected 1: the state must be"),
+    "state": (lambda f: f.restore({"format": 0}), ValueError, "expected 2: the state must be"),
+    "streak": (
+        lambda f: f.restore({**f.save(), "recovery": (4, 1.0, np.full((2, 3), math.nan))}),
+        ValueError,
+        r"state\['recovery'\]\[2\]\[0, 0\] is nan",
+    ),
 }
 
 

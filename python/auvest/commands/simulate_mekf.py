@@ -63,7 +63,7 @@ def command(
         int,
         typer.Option(
             min=0,
-            max=100,
+            max=60,
             help="Rejections in a row after which the covariance is widened; 0: never.",
             rich_help_panel=FILTER,
         ),

@@ -1,16 +1,32 @@
-// The way out of lock-out: after n rejections the belief, not the sensor, is taken to be wrong.
+// The way out of lock-out: after enough rejections the belief, not the sensor, is taken to be
+// wrong.
 //
 // A kernel that rejects beyond k1 sigma keeps rejecting when the prior itself is off by more than
 // that: P does not know, and nothing tells it. The M-estimation EKF paper does not treat the case.
-// Here a count goes up by 2 with each rejection and down by 1 with each acceptance, so that it also
-// gets there where every second leader happens to agree with the wrong prior. At 2 n, and at every
-// further rejection while it stands there, the position variance grows by
+// Here a count weighs the two explanations against each other, as Page's test (1954) does: it adds
+// up log likelihood ratios of "the prior is wrong" to "these are outliers", never falls below 0,
+// and decides at a limit. Outliers are independent of each other; a wrong prior is wrong by the
+// same amount until it moves, so that whoever looks along the same line sees the same innovation
+// again:
+//
+//     rejected, along a line not looked along lately         log 1 / p          =  2.0 nats    + 4
+//     rejected, the same innovation along the same line      log 1 / (p q)      =  3.5 nats    + 7
+//     rejected, another innovation along the same line       log 1 / (1 - q)    =  0.2 nats    + 1
+//     accepted                                                                                 - 2
+//
+// with p = 0.14 the share of rejections where every fifth range is an outlier of ten sigma, and
+// q = 0.22 the probability that one of these repeats another. A count is half a nat, rounded up so
+// that no geometry stays locked out. An acceptance takes back half a rejection only: it may come
+// from a line along which the error does not show. The limit is that of n rejections, 4 n.
+//
+// At the limit, and at every further rejection while the count stands there, the position variance
+// grows by
 //
 //     q = max over what was rejected since the last time of (r^2 - S) / |h|^2
 //
 // with h the position part of that component's row of H, so that the same innovation would now
 // stand at one sigma. The measurement that completes the streak stays rejected: where the streak
-// was n outliers by chance, the next good measurement finds a wide belief and puts it right, and
+// was outliers by chance, the next good measurement finds a wide belief and puts it right, and
 // nothing but the prior's knowledge is lost.
 #pragma once
 
@@ -25,57 +41,102 @@ struct RejectionStreak {
   using Scalar = Scalar_;
 
   struct Params {
-    std::uint8_t rejections = 6;  ///< n, 1..100
+    std::uint8_t rejections = 6;  ///< n, 1..60: so many in a row, if none repeats another
   };
 
   Params params;
-  std::uint8_t count;  ///< 0..2 n
-  Scalar variance;     ///< q as the rejections so far ask for it [m^2], 0 if count is
+  std::uint8_t count;           ///< 0..4 n
+  Scalar variance;              ///< q as the rejections so far ask for it [m^2], 0 if count is
+  Matrix<Scalar, 2, 3> recent;  ///< h and innovation of the last two rejections, the newest first
 
-  explicit RejectionStreak(const Params& p = Params()) : params(p), count(0), variance(Scalar(0)) {}
+  explicit RejectionStreak(const Params& p = Params()) : params(p) { restart(); }
 
   void restart() {
     count = 0;
     variance = Scalar(0);
+    math::set_zero(recent);
   }
 
   /// The first two states (or the only one seen) are the position.
   template <int M, int O, int N>
   bool after(const RobustCorrection<Scalar, M>& correction, const Matrix<Scalar, M, O>& a,
              const Matrix<Scalar, O, O>& root, Belief<Scalar, N>& belief) {
-    bool rejected = false;
-    for (int m = 0; m < M; ++m) rejected = rejected || !(correction.weight(m) > Scalar(0));
-    if (!rejected) {
-      if (count > 0) --count;
+    int evidence = 0;
+    for (int m = 0; m < M; ++m) {
+      if (correction.weight(m) > Scalar(0)) continue;
+      const int more = weigh(&a(m, 0), root, correction.innovation(m), correction.S(m, m));
+      if (more > evidence) evidence = more;
+    }
+    if (evidence == 0) {
+      count = static_cast<std::uint8_t>(count > kAccepted ? count - kAccepted : 0);
       if (count == 0) variance = Scalar(0);
       return false;
     }
-    constexpr int kPosition = O < 2 ? O : 2;
-    for (int m = 0; m < M; ++m) {
-      if (correction.weight(m) > Scalar(0)) continue;
-      Vector<Scalar, O> h;  // h L = a
-      for (int k = O - 1; k >= 0; --k) {
-        Scalar value = a(m, k);
-        for (int i = k + 1; i < O; ++i) value = value - h(i) * root(i, k);
-        h(k) = value / root(k, k);
-      }
-      const Scalar missing =
-          correction.innovation(m) * correction.innovation(m) - correction.S(m, m);
-      const Scalar needed = missing / math::dot(h.data(), h.data(), kPosition);
-      if (math::is_finite(needed) && needed > variance) variance = needed;
-    }
-    const int full = 2 * params.rejections;
-    count = static_cast<std::uint8_t>(count + 2 < full ? count + 2 : full);
-    if (count < full) return false;
-    for (int i = 0; i < kPosition; ++i) belief.P(i, i) = belief.P(i, i) + variance;
+    const int limit = kRejected * params.rejections;
+    count = static_cast<std::uint8_t>(count + evidence < limit ? count + evidence : limit);
+    if (count < limit) return false;
+    for (int i = 0; i < (O < 2 ? O : 2); ++i) belief.P(i, i) = belief.P(i, i) + variance;
     variance = Scalar(0);
     return true;
   }
 
   Status check() const {
-    const bool valid = params.rejections >= 1 && params.rejections <= 100 &&
-                       count <= 2 * params.rejections && math::is_nonnegative(variance);
+    const bool valid = params.rejections >= 1 && params.rejections <= 60 &&
+                       count <= kRejected * params.rejections && math::is_nonnegative(variance) &&
+                       math::all_finite(recent);
     return valid ? Status::kOk : Status::kBadParameter;
+  }
+
+ private:
+  // Evidence for a wrong prior, in halves of a nat.
+  static constexpr int kRejected = 4;
+  static constexpr int kRepeated = 7;
+  static constexpr int kContradicted = 1;
+  static constexpr int kAccepted = 2;  // against it
+
+  /// What the rejection of a component says, and how far off it says the position is.
+  template <int O>
+  int weigh(const Scalar* a, const Matrix<Scalar, O, O>& root, Scalar innovation, Scalar s) {
+    constexpr int kPosition = O < 2 ? O : 2;
+    Vector<Scalar, O> h;  // h L = a
+    for (int k = O - 1; k >= 0; --k) {
+      Scalar value = a[k];
+      for (int i = k + 1; i < O; ++i) value = value - h(i) * root(i, k);
+      h(k) = value / root(k, k);
+    }
+    const Scalar square = innovation * innovation;
+    const Scalar length2 = math::dot(h.data(), h.data(), kPosition);
+    const Scalar needed = (square - s) / length2;
+    if (!math::is_finite(needed) || !math::is_finite(length2)) return kRejected;
+    if (needed > variance) variance = needed;
+
+    // The same line: within 20 degrees. The same innovation: within three of its sigmas, and an
+    // eighth for what a line turns between two looks along it.
+    const Scalar near2 = Scalar(0.125) * length2;
+    const Scalar alike2 = Scalar(9) * s + Scalar(0.015625) * square;
+    int evidence = kRejected;
+    int replaced = 1;
+    for (int i = 0; i < 2; ++i) {
+      Scalar apart2 = Scalar(0);
+      for (int k = 0; k < kPosition; ++k) {
+        const Scalar apart = h(k) - recent(i, k);
+        apart2 = apart2 + apart * apart;
+      }
+      if (!(apart2 < near2)) continue;
+      const Scalar change = innovation - recent(i, 2);
+      if (change * change < alike2) {
+        evidence = kRepeated;
+        replaced = i;
+        break;
+      }
+      evidence = kContradicted;
+    }
+    if (replaced == 1) {
+      for (int k = 0; k < 3; ++k) recent(1, k) = recent(0, k);
+    }
+    for (int k = 0; k < kPosition; ++k) recent(0, k) = h(k);
+    recent(0, 2) = innovation;
+    return evidence;
   }
 };
 
