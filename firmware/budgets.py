@@ -162,7 +162,11 @@ def _record(program: str) -> bytes:
 
 
 def _range_record(steps: int) -> bytes:
-    """Variance and the steps of a slave among two leaders, one range of ten an outlier."""
+    """Variance and the steps of a slave among two leaders, one range of ten an outlier.
+
+    Half-way the slave is 200 m from where it was, as if set down there: the filter locks out and
+    recovers.
+    """
     rng = np.random.default_rng(1)
     slave, leaders = cooperative.tracks(5 * steps)
     slave, leaders = slave[4::5], leaders[4::5, :]
@@ -172,6 +176,7 @@ def _range_record(steps: int) -> bytes:
         [np.hypot(*moved.T), np.zeros(steps), np.arctan2(moved[:, 1], moved[:, 0])], axis=1
     )
     motion += rng.standard_normal((steps, 3)) * [0.05, 0.0, 0.01]
+    slave[steps // 2 :, 1] += 200.0
     z = np.hypot(*(slave - leader).T)
     z += rng.standard_normal(steps) * np.where(rng.random(steps) < 0.1, 10.0, 1.0)
     rows = np.column_stack([motion, leader, z])
@@ -395,7 +400,7 @@ def page(rows: list[Row]) -> str:
         f"{STEPS['aukf']:,}); the vehicle circles through the station, so the near field and every",
         "bearing occur. `robust_ekf_predict` and `robust_ekf_update`: dead reckoning by speed and",
         "heading and one range, M-estimation EKF of two states with IGG and the recovery, a range",
-        "of ten an outlier; the same program, its two halves.",
+        "of ten an outlier, and a lock-out half-way; the same program, its two halves.",
         f"`slatf1` and `slatf2`: N = {AVR_PARTICLES}, one master, two predictions and one echo,",
         f"{ECHOES} times at the beginning of the paper's scenario. The examples: `first_steps` is",
         "its whole run, serial text included; `replay` counts predict, update and feedback by the",

@@ -175,6 +175,51 @@ TEST_CASE("robust update: innovation form, weights from innovation / sqrt S") {
   }
 }
 
+/// One number that N states are seen through, weighted: x, P, S and NIS of the textbook.
+template <int N>
+void check_one_number(Residual residual) {
+  using Still = auvest::LinearProcess<double, N>;
+  using One = auvest::LinearMeasurement<double, N, 1>;
+  using Rule = auvest::RobustUpdate<auvest::Igg<double>>;
+  using Square = Matrix<double, N, N>;
+  Rule::Params params;
+  params.residual = residual;
+  Square p = Square::Identity();
+  p(0, 1) = p(1, 0) = 0.5;
+  Matrix<double, 1, N> h = Matrix<double, 1, N>::Constant(0.7);
+  h(0) = -0.4;
+  const double r = 0.3;
+  const double s = (h * p * h.transpose())(0) + r;
+  for (const double t : {1.2, 2.0, -2.9, 3.5}) {
+    auvest::Robust<auvest::Ekf<Still>, Rule> filter(
+        auvest::Ekf<Still>(Still(Square::Identity(), Square::Zero())),
+        Rule(auvest::Igg<double>(), auvest::NoRecovery<double>(), params));
+    REQUIRE(filter.reset(Vector<double, N>::Zero(), p) == Status::kOk);
+    const double z = t * std::sqrt(s);
+    const auto u = filter.update(Vector<double, 1>(z), One(h, Matrix<double, 1, 1>(r)));
+    REQUIRE(u.status == Status::kOk);
+    CHECK(u.S(0, 0) == close_to(s, 1e-14));
+    CHECK(u.nis == close_to(z * z / s, 1e-14));
+    const double size = std::fabs(t);
+    if (residual == Residual::kInnovation) {
+      const double wanted = size < 1.5 ? 1 : size < 3 ? 1.5 / size : 0;
+      CHECK(std::fabs(u.weight(0) - wanted) < 1e-14);
+    }
+    const double weight = u.weight(0);
+    const Vector<double, N> gain = weight > 0 ? p * h.transpose() / (s + r / weight - r)
+                                              : Vector<double, N>(0 * h.transpose());
+    CHECK((filter.x() - gain * z).cwiseAbs().maxCoeff() < 1e-14);
+    CHECK((filter.P() - (p - gain * (h * p))).cwiseAbs().maxCoeff() < 1e-14);
+  }
+}
+
+TEST_CASE("robust update: one number, weighted") {
+  for (const Residual residual : {Residual::kInnovation, Residual::kPostFit}) {
+    check_one_number<2>(residual);
+    check_one_number<3>(residual);
+  }
+}
+
 TEST_CASE("robust update: the post-fit form is a fixed point of Eq. (20)") {
   // One state of variance p, seen with variance r; Huber's post-fit residual v solves
   // v = z r_w / (p + r_w) with r_w = r / w and w = k sqrt(r) / |v|: v = z - p k / sqrt(r).
@@ -273,6 +318,13 @@ TEST_CASE("robust update: refuses what the plain one refuses, and bad parameters
   CHECK(refused.status == Status::kNotPositiveDefinite);
   CHECK(refused.weight(0) == 0);
   CHECK(filter.update(Vector<double, kM>(1e300, 0), sensor()).status == Status::kOverflow);
+  const Matrix<double, 1, kN> row(1, 0, 0);
+  for (const double r : {-1.0, 0.3}) {  // one number: with a weight of 0, and NIS beyond the range
+    const auvest::LinearMeasurement<double, kN, 1> one(row, Matrix<double, 1, 1>(r));
+    const auto alone = filter.update(Vector<double, 1>(r < 0 ? 9 : 1e300), one);
+    CHECK(alone.status == (r < 0 ? Status::kNotPositiveDefinite : Status::kOverflow));
+    CHECK(alone.S(0, 0) == 0);
+  }
   CHECK(filter.P() == prior());
   CHECK(filter.rule().recovery.count == 0);
 

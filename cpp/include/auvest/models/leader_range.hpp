@@ -115,9 +115,10 @@ struct LeaderRange : MeasurementModel<LeaderRange<Scalar_, N>, Scalar_, N, 1, 2>
                     Measurement& innovation, Noise& noise) const {
     const Scalar first = point.ux * root(1, 0) - point.uy * root(0, 0);  // L' n, n = (-uy, ux)
     const Scalar second = point.ux * root(1, 1);
-    const Scalar bend = (first * first + second * second) * (Scalar(0.5) * point.inverse);
+    const Scalar twice = (first * first + second * second) * point.inverse;
+    const Scalar bend = Scalar(0.5) * twice;
     innovation(0) = innovation(0) - bend;
-    noise(0, 0) = noise(0, 0) + (bend + bend) * bend;
+    noise(0, 0) = noise(0, 0) + twice * bend;
   }
 
   Status check() const {

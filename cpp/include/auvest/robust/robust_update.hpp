@@ -170,6 +170,30 @@ struct RobustUpdate {
     return correct_belief(belief, moved, slope, rows, e, weighted);
   }
 
+  /// The same for one number: the NIS is known, and S grows as E does. Uses up all but `slope`.
+  template <int O, int U, int N>
+  AUVEST_INLINE Status correct_weighted(Belief<Scalar, N>& belief, Matrix<Scalar, O, O>& root,
+                                        const Matrix<Scalar, U, O>& slope, Matrix<Scalar, 1, O>& a,
+                                        Matrix<Scalar, 1, 1>& noise,
+                                        RobustCorrection<Scalar, 1>& correction) const {
+    if (!(noise(0, 0) > Scalar(0))) return Status::kNotPositiveDefinite;
+    const Scalar s = correction.S(0, 0);
+    const Scalar nis = params.residual == Residual::kInnovation
+                           ? correction.standardised(0) * correction.standardised(0)
+                           : correction.innovation(0) / s * correction.innovation(0);
+    if (!math::is_finite(nis)) return Status::kOverflow;
+    Status status = Status::kOk;
+    if (correction.decision != Decision::kRejected) {
+      const Scalar weighted = noise(0, 0) / correction.weight(0);
+      correction.S(0, 0) = s + (weighted - noise(0, 0));
+      noise(0, 0) = weighted;
+      status = correct_belief(belief, root, slope, a, noise, correction);
+      correction.S(0, 0) = s;
+    }
+    correction.nis = nis;
+    return status;
+  }
+
   /// A, E and the innovation with the weights as they are.
   template <int M, int O>
   static void weigh(const Matrix<Scalar, M, O>& a, const Matrix<Scalar, M, M>& noise,
