@@ -46,7 +46,7 @@ class Robust : public Filter {
   AUVEST_OUTLINE RobustCorrection<Scalar, Model::kSize> update(const typename Model::Measurement& z,
                                                                const Model& model) {
     static_assert(Model::kStates == Filter::kStates, "the measurement model is for another state");
-    RobustCorrection<Scalar, Model::kSize> correction(Status::kOk);
+    RobustCorrection<Scalar, Model::kSize> correction;
     correction.status = this->correct(z, model, rule_, correction);
     if (correction.status != Status::kOk) correction.clear(correction.status);
     return correction;

@@ -24,7 +24,8 @@ struct RobustCorrection : Correction<Scalar, M> {
   Vector<Scalar, M> standardised;  ///< the residuals that the weights belong to [sigma]
   Vector<Scalar, M> weight;        ///< of each component, 0..1
 
-  explicit RobustCorrection(Status s) : Correction<Scalar, M>(s) { clear(s); }
+  RobustCorrection() {}  ///< to be filled by an update
+  explicit RobustCorrection(Status s) { clear(s); }
 
   void clear(Status s) {
     Correction<Scalar, M>::clear(s);

@@ -113,6 +113,7 @@ struct RobustUpdate {
   Status settle(const Matrix<Scalar, M, O>& a, const Matrix<Scalar, M, M>& noise,
                 RobustCorrection<Scalar, M>& correction) const {
     for (int m = 0; m < M; ++m) correction.weight(m) = Scalar(1);
+    correction.iterations = 0;
     bool settled = false;
     while (!settled) {
       Matrix<Scalar, M, O> rows;
