@@ -92,6 +92,13 @@ AUVEST_INLINE void innovation_covariance(const Matrix<Value, M, O>& a,
   math::mirror_lower(s);
 }
 
+/// The same for one number and two states, without loops.
+template <class Value>
+AUVEST_INLINE void innovation_covariance(const Matrix<Value, 1, 2>& a,
+                                         const Matrix<Value, 1, 1>& noise, Matrix<Value, 1, 1>& s) {
+  s(0, 0) = noise(0, 0) + a(0, 0) * a(0, 0) + a(0, 1) * a(0, 1);
+}
+
 /// Potter's formula, one decorrelated measurement after the other. `noise` is E = U D U' as
 /// math::ldlt leaves it. Uses up `a`; leaves the variances s on the diagonal of `noise`, whose
 /// product is the determinant of S. False where the result would not be finite.
@@ -223,41 +230,40 @@ AUVEST_INLINE Status correct_belief(Belief<Scalar, N>& belief, Matrix<Scalar, O,
   return move_belief(belief, root, slope, posterior) ? Status::kOk : Status::kOverflow;
 }
 
-/// The same for one number seen through the only two states: a range. G is I less a matrix of rank
-/// one, so that L G = L - gamma (L f) f' and the shift of the mean is a multiple of L f.
+/// The same for one number seen through the only two states: a range. In the plane
+/// |f|^2 I - f f' = g g' with g = (f_1, -f_0), so that I - f f' / s = (d I + g g') / s and
+///
+///     P+ = (d / s) P + u u' / s,   u = L g,
+///
+/// again a sum of squares on the diagonal, here without a root.
 template <class Scalar>
 AUVEST_OUTLINE AUVEST_INLINE Status correct_belief(
     Belief<Scalar, 2>& belief, Matrix<Scalar, 2, 2>& root, const Matrix<Scalar, 1, 2>&,
     Matrix<Scalar, 1, 2>& a, Matrix<Scalar, 1, 1>& noise, Correction<Scalar, 1>& correction) {
-  using math::sqrt;
   if (!(noise(0, 0) > Scalar(0))) return Status::kNotPositiveDefinite;
   const Scalar innovation = correction.innovation(0);
   const Scalar spread = correction.S(0, 0);
-  const Scalar gamma = Scalar(1) / (spread + sqrt(noise(0, 0) * spread));
-  const Scalar step = innovation / spread;
+  const Scalar inverse = Scalar(1) / spread;
+  const Scalar step = innovation * inverse;
   const Scalar nis = step * innovation;
   const Scalar f0 = a(0, 0);
   const Scalar f1 = a(0, 1);
-  const Scalar v0 = root(0, 0) * f0;  // L f
-  const Scalar v1 = root(1, 0) * f0 + root(1, 1) * f1;
-  const Scalar x0 = belief.x(0) + v0 * step;
-  const Scalar x1 = belief.x(1) + v1 * step;
-  const bool finite = math::is_finite(spread) && math::is_finite(gamma) && math::is_finite(nis) &&
+  const Scalar x0 = belief.x(0) + root(0, 0) * f0 * step;
+  const Scalar x1 = belief.x(1) + (root(1, 0) * f0 + root(1, 1) * f1) * step;
+  const bool finite = math::is_finite(spread) && math::is_finite(inverse) && math::is_finite(nis) &&
                       math::is_finite(x0) && math::is_finite(x1);
   if (!finite) return Status::kOverflow;
   correction.nis = nis;
   belief.x(0) = x0;
   belief.x(1) = x1;
-  const Scalar w0 = gamma * v0;
-  const Scalar w1 = gamma * v1;
-  const Scalar l00 = root(0, 0) - w0 * f0;
-  const Scalar l01 = -(w0 * f1);
-  const Scalar l10 = root(1, 0) - w1 * f0;
-  const Scalar l11 = root(1, 1) - w1 * f1;
-  belief.P(0, 0) = l00 * l00 + l01 * l01;
-  belief.P(1, 0) = l10 * l00 + l11 * l01;
+  const Scalar left = noise(0, 0) * inverse;
+  const Scalar u0 = root(0, 0) * f1;
+  const Scalar u1 = root(1, 0) * f1 - root(1, 1) * f0;
+  const Scalar u1_scaled = u1 * inverse;
+  belief.P(0, 0) = left * belief.P(0, 0) + u0 * (u0 * inverse);
+  belief.P(1, 0) = left * belief.P(1, 0) + u0 * u1_scaled;
   belief.P(0, 1) = belief.P(1, 0);
-  belief.P(1, 1) = l10 * l10 + l11 * l11;
+  belief.P(1, 1) = left * belief.P(1, 1) + u1 * u1_scaled;
   return Status::kOk;
 }
 
