@@ -40,6 +40,14 @@ def test_the_committed_consistency_is_as_it_must_be(committed):
         assert row["nees"]["consistent"] is matched, row
 
 
+def test_the_committed_lock_outs_end_within_twelve_ranges(committed):
+    displaced = committed["displaced"]
+    assert displaced["igg, recovery"]["back"] == mekf.DISPLACED_RUNS
+    assert displaced["igg, recovery"]["settled"] == mekf.DISPLACED_RUNS
+    assert displaced["igg, no recovery"]["back"] == 0
+    assert displaced["igg, no recovery"]["slowest"] is None
+
+
 def test_the_committed_numbers_are_what_the_code_gives(committed):
     wanted = committed["contamination"][1]
     noise = mekf.RangeNoise(

@@ -273,9 +273,9 @@ int false_recoveries(double outlier_sigma_m) {
 }
 
 TEST_CASE("lock-out: outliers are hardly ever taken for a wrong prior") {
-  // 33,120 ranges each. Of 662,400, 31 and 3 did; of rejections merely counted, 106 and 461.
-  CHECK(false_recoveries(10) <= 5);
-  CHECK(false_recoveries(30) <= 2);
+  // 33,120 ranges each. Rejections merely counted, 2 up and 1 down, would make 6 and 14.
+  CHECK(false_recoveries(10) <= 3);
+  CHECK(false_recoveries(30) <= 1);
 }
 
 }  // namespace

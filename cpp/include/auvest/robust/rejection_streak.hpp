@@ -117,12 +117,9 @@ struct RejectionStreak {
     int evidence = kRejected;
     int replaced = 1;
     for (int i = 0; i < 2; ++i) {
-      Scalar apart2 = Scalar(0);
-      for (int k = 0; k < kPosition; ++k) {
-        const Scalar apart = h(k) - recent(i, k);
-        apart2 = apart2 + apart * apart;
-      }
-      if (!(apart2 < near2)) continue;
+      Scalar apart[kPosition];
+      for (int k = 0; k < kPosition; ++k) apart[k] = h(k) - recent(i, k);
+      if (!(math::dot(apart, apart, kPosition) < near2)) continue;
       const Scalar change = innovation - recent(i, 2);
       if (change * change < alike2) {
         evidence = kRepeated;
