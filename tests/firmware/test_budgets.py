@@ -49,7 +49,7 @@ def test_slatf_sleeps_half_of_the_sonar_period(rows):
 
 
 def test_a_range_takes_at_most_15_000_cycles(rows):
-    """The median; a range that is weighted down takes three divisions more."""
+    """In the worst case: weighted down, rejected, or with a recovery."""
     assert rows["robust_ekf_update"].cycles_max <= 15_000
 
 
