@@ -60,6 +60,33 @@ void check_plain_bits(Filter plain, const Rule& rule) {
   }
 }
 
+/// The same for a range, which has code of its own.
+template <class Filter>
+void check_plain_bits_of_a_range() {
+  using Scalar = typename Filter::Scalar;
+  Filter plain{typename Filter::Process()};
+  auvest::Robust<Filter, auvest::RobustUpdate<auvest::Unit<Scalar>>> robust(plain);
+  const auvest::LeaderRange<Scalar, 2> leader;
+  const Vector<Scalar, 2> x(Scalar(30), Scalar(-40));
+  const Matrix<Scalar, 2, 2> P = Matrix<Scalar, 2, 2>::Identity();
+  REQUIRE(plain.reset(x, P) == Status::kOk);
+  REQUIRE(robust.reset(x, P) == Status::kOk);
+  Random random(3);
+  for (int k = 0; k < 200; ++k) {
+    const Vector<Scalar, 3> motion(Scalar(1), Scalar(0), Scalar(0.02) * Scalar(k));
+    REQUIRE(plain.predict(Scalar(0.5), motion) == Status::kOk);
+    REQUIRE(robust.predict(Scalar(0.5), motion) == Status::kOk);
+    const Vector<Scalar, 1> z(Scalar(50) + Scalar(5) * random.normal<Scalar>());
+    const auto a = plain.update(z, leader);
+    const auto b = robust.update(z, leader);
+    REQUIRE(b.decision == Decision::kAccepted);
+    CHECK(a.nis == b.nis);
+    CHECK(same_bits(a.S, b.S));
+    CHECK(same_bits(plain.x(), robust.x()));
+    CHECK(same_bits(plain.P(), robust.P()));
+  }
+}
+
 template <class Scalar>
 void check_plain_bits_of_all() {
   using Process = auvest::ExactAcceleration<Scalar>;
@@ -80,6 +107,8 @@ void check_plain_bits_of_all() {
 TEST_CASE("robust update: unit kernel, or infinite thresholds, give the bits of the plain filter") {
   check_plain_bits_of_all<double>();
   check_plain_bits_of_all<float>();
+  check_plain_bits_of_a_range<auvest::Ekf<auvest::SpeedHeading<float>>>();
+  check_plain_bits_of_a_range<auvest::Ukf<auvest::SpeedHeading<float>>>();
 }
 
 // ---- Weights

@@ -131,8 +131,9 @@ TEST_CASE("lock-out: the same with two leaders that move, the paper's geometry")
     CAPTURE(direction);
     for (std::uint64_t run = 0; run < 8; ++run) {
       CAPTURE(run);
-      for (const Course& c : {among_two_leaders<auvest::Ekf, Streak>(direction, 1u + d, run),
-                              among_two_leaders<auvest::Ukf, Streak>(direction, 1u + d, run)}) {
+      for (const Course& c :
+           {among_two_leaders<auvest::Ekf, Streak>(direction, 1 + std::uint64_t(d), run),
+            among_two_leaders<auvest::Ukf, Streak>(direction, 1 + std::uint64_t(d), run)}) {
         CHECK(c.back >= 4);
         CHECK(c.back <= 12);
         CHECK(c.within > 250);
