@@ -22,7 +22,7 @@
 // At the limit, and at every further rejection while the count stands there, the position variance
 // grows by
 //
-//     q = max over what was rejected since the last time of (r^2 - S) / |h|^2
+//     v = max over what was rejected since the last time of (r^2 - S) / |h|^2
 //
 // with h the position part of that component's row of H, so that the same innovation would now
 // stand at one sigma. The measurement that completes the streak stays rejected: where the streak
@@ -46,7 +46,7 @@ struct RejectionStreak {
 
   Params params;
   std::uint8_t count;           ///< 0..4 n
-  Scalar variance;              ///< q as the rejections so far ask for it [m^2], 0 if count is
+  Scalar variance;              ///< v as the rejections so far ask for it [m^2], 0 if count is
   Matrix<Scalar, 2, 3> recent;  ///< h and innovation of the last two rejections, the newest first
 
   explicit RejectionStreak(const Params& p = Params()) : params(p) { restart(); }
