@@ -421,14 +421,6 @@ def page(rows: list[Row]) -> str:
         measured = f"{figure.measured:,.{figure.digits}f}"
         verdict = "met" if figure.met else "**not met**"
         lines.append(f"| {figure.name} | {figure.limit:,} | {measured} | {verdict} |")
-    if any(not figure.met for figure in targets(rows)):
-        lines += [
-            "",
-            "What is missed: avr-gcc surrounds every call of a float routine with loads and",
-            "stores, and the figure holds the checks of all arguments, the near field and the",
-            "exact reduction of large angles. Bytes can be had for cycles; here the cycles were",
-            "chosen.",
-        ]
     lines += slatf_page(rows)
     return "\n".join([*lines, ""])
 
