@@ -73,3 +73,6 @@ static_assert(sizeof(float) == 4 && FLT_RADIX == 2 && FLT_MANT_DIG == 24,
 #if defined(AUVEST_ARDUINO_LIBRARY) && defined(__AVR_HAVE_MUL__) && defined(__AVR_HAVE_JMP_CALL__)
 #define AUVEST_AVR_KERNELS
 #endif
+
+// What is rarely run: called, so that it takes no registers from what is often run.
+#define AUVEST_COLD __attribute__((cold, noinline))

@@ -102,7 +102,11 @@ AUVEST_INLINE void innovation_covariance(const Matrix<Value, 1, 2>& a,
 /// Potter's formula, one decorrelated measurement after the other. `noise` is E = U D U' as
 /// math::ldlt leaves it. Uses up `a`; leaves the variances s on the diagonal of `noise`, whose
 /// product is the determinant of S. False where the result would not be finite.
-template <class Value, int M, int O>
+///
+/// The first measurement meets y = 0 and G = I, and with `Independent` E is diagonal. Batches skip
+/// what these multiply: a zero would at most change the sign of another in f, v and `surprise`, and
+/// they are only added to numbers of which none is -0. (One number does not: code costs flash.)
+template <bool Independent = false, class Value, int M, int O>
 AUVEST_OUTLINE AUVEST_INLINE math::Mask<Value> potter(Matrix<Value, M, O>& a,
                                                       Matrix<Value, M, M>& noise,
                                                       const Vector<Value, M>& innovation,
@@ -122,24 +126,30 @@ AUVEST_OUTLINE AUVEST_INLINE math::Mask<Value> potter(Matrix<Value, M, O>& a,
   AUVEST_UNROLL
   for (int m = 0; m < M; ++m) {
     Value* const row = &a(m, 0);
-    residual(m) = math::minus_dot(innovation(m), &noise(m, 0), residual.data(), m);
+    const bool first = !math::is_number<Value>() && m == 0;
+    const int correlated = !math::is_number<Value>() && Independent ? 0 : m;
+    residual(m) = math::minus_dot(innovation(m), &noise(m, 0), residual.data(), correlated);
     AUVEST_UNROLL
-    for (int l = 0; l < m; ++l) add_scaled(-noise(m, l), &a(l, 0), row, O);
+    for (int l = 0; l < correlated; ++l) add_scaled(-noise(m, l), &a(l, 0), row, O);
     Vector<Value, O> f;  // G' a
     AUVEST_UNROLL
-    for (int k = 0; k < O; ++k) f(k) = math::dot(&g(k, 0), row, O);
+    for (int k = 0; k < O; ++k) f(k) = first ? row[k] : math::dot(&g(k, 0), row, O);
     const Value spread = math::plus_dot(noise(m, m), f.data(), f.data(), O);
     const Value minus_gamma = Value(-1) / (spread + sqrt(noise(m, m) * spread));
     // f and with it all that follows from it is bounded by these two.
     finite = finite && is_finite(spread) && is_finite(minus_gamma);
     noise(m, m) = spread;
-    const Value surprise = math::minus_dot(residual(m), row, y.data(), O);
+    const Value surprise = first ? residual(m) : math::minus_dot(residual(m), row, y.data(), O);
     const Value step = surprise / spread;
     posterior.nis = posterior.nis + step * surprise;
     Vector<Value, O> v;  // G f
-    math::set_zero(v);
-    AUVEST_UNROLL
-    for (int k = 0; k < O; ++k) add_scaled(f(k), &g(k, 0), v.data(), O);
+    if (first) {
+      v = f;
+    } else {
+      math::set_zero(v);
+      AUVEST_UNROLL
+      for (int k = 0; k < O; ++k) add_scaled(f(k), &g(k, 0), v.data(), O);
+    }
     add_scaled(step, v.data(), y.data(), O);
     AUVEST_UNROLL
     for (int k = 0; k < O; ++k) v(k) = v(k) * minus_gamma;
@@ -171,7 +181,7 @@ AUVEST_OUTLINE AUVEST_INLINE math::Mask<Value> move_belief(Belief<Value, N>& bel
     x(i) = math::plus_dot(belief.x(i), &slope(i - O, 0), shift.data(), O);
   }
   const math::Mask<Value> finite = math::all_finite(x);
-  if (!any(finite)) return finite;
+  if (math::is_number<Value>() && !any(finite)) return finite;
   math::copy(x, belief.x);
 
   // The observed states: P_oo = (L G)(L G)', in both triangles for what follows.

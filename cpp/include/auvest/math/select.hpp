@@ -16,6 +16,12 @@ struct ScalarOf {
   using Type = Value;
 };
 
+/// True if a value is one number, not a batch.
+template <class Value>
+constexpr bool is_number() {
+  return sizeof(Value) == sizeof(typename ScalarOf<Value>::Type);
+}
+
 /// What a comparison of two values gives.
 template <class Value>
 using Mask = decltype(Value() < Value());

@@ -135,13 +135,24 @@ AUVEST_INLINE Value fraction_of(const WordBatch<Arch>& word) {
 
 namespace detail {
 
-/// The scalar function of each lane.
+/// The scalar function of each lane, or of each pair of lanes.
 template <class Arch, class Function>
-inline FloatBatch<Arch> lane_by_lane(const FloatBatch<Arch>& x, Function function) {
+AUVEST_COLD FloatBatch<Arch> lane_by_lane(const FloatBatch<Arch>& x, Function function) {
   alignas(64) float lanes[FloatBatch<Arch>::kWidth];
   x.v.store_aligned(lanes);
   for (float& lane : lanes) lane = function(lane);
   return FloatBatch<Arch>(xsimd::batch<float, Arch>::load_aligned(lanes));
+}
+
+template <class Arch, class Function>
+AUVEST_COLD FloatBatch<Arch> lane_by_lane(const FloatBatch<Arch>& x, const FloatBatch<Arch>& y,
+                                          Function function) {
+  alignas(64) float lanes_x[FloatBatch<Arch>::kWidth];
+  alignas(64) float lanes_y[FloatBatch<Arch>::kWidth];
+  x.v.store_aligned(lanes_x);
+  y.v.store_aligned(lanes_y);
+  for (int i = 0; i < FloatBatch<Arch>::kWidth; ++i) lanes_x[i] = function(lanes_x[i], lanes_y[i]);
+  return FloatBatch<Arch>(xsimd::batch<float, Arch>::load_aligned(lanes_x));
 }
 
 }  // namespace detail
@@ -223,12 +234,7 @@ AUVEST_INLINE FloatBatch<Arch> atan2(const FloatBatch<Arch>& y, const FloatBatch
   const Value large = select(steep, size_y, size_x);
   const Value ratio = small / large;
   if (!xsimd::all(ratio >= Value(7.88860905e-31f) && ratio <= Value(1.0f))) {  // 2^-100
-    alignas(64) float lanes_y[Value::kWidth];
-    alignas(64) float lanes_x[Value::kWidth];
-    y.v.store_aligned(lanes_y);
-    x.v.store_aligned(lanes_x);
-    for (int i = 0; i < Value::kWidth; ++i) lanes_y[i] = math::atan2(lanes_y[i], lanes_x[i]);
-    return Value(xsimd::batch<float, Arch>::load_aligned(lanes_y));
+    return detail::lane_by_lane(y, x, [](float a, float b) { return math::atan2(a, b); });
   }
   const auto left = x < zero;
   const Value high = select(steep, Value(1.57079637f), select(left, Value(3.14159274f), zero));

@@ -4,6 +4,7 @@
 
 #include "auvest/config.hpp"
 #include "auvest/math/angle.hpp"
+#include "auvest/math/linear_algebra.hpp"
 #include "auvest/math/select.hpp"
 #include "auvest/math/trigonometry.hpp"
 #include "auvest/particles/lanes.hpp"
@@ -28,31 +29,20 @@ AUVEST_INLINE void store_mean(typename Lanes::Scalar* to, const Vector<Value, N>
   for (int k = 0; k < N; ++k) Lanes::store(to + k * kBlock, x(k));
 }
 
+/// Reads a lower triangle; `from` is the first's first element.
 template <class Lanes, class Value, int N>
-AUVEST_INLINE void load_belief(const typename Lanes::Scalar* from, Belief<Value, N>& belief) {
-  load_mean<Lanes>(from, belief.x);
-  int offset = N * kBlock;
+AUVEST_INLINE void load_covariance(const typename Lanes::Scalar* from, Matrix<Value, N, N>& p) {
   AUVEST_UNROLL
   for (int k = 0; k < N; ++k) {
     AUVEST_UNROLL
-    for (int l = 0; l <= k; ++l, offset += kBlock) belief.P(k, l) = Lanes::load(from + offset);
+    for (int l = 0; l <= k; ++l, from += kBlock) p(k, l) = Lanes::load(from);
   }
 }
 
-/// Reads again what is stored, in the lanes of `where` only.
 template <class Lanes, class Value, int N>
-AUVEST_INLINE void reload_belief(const math::Mask<Value>& where, const typename Lanes::Scalar* from,
-                                 Belief<Value, N>& belief) {
-  using math::select;
-  int offset = 0;
-  for (int k = 0; k < N; ++k, offset += kBlock) {
-    belief.x(k) = select(where, Value(Lanes::load(from + offset)), belief.x(k));
-  }
-  for (int k = 0; k < N; ++k) {
-    for (int l = 0; l <= k; ++l, offset += kBlock) {
-      belief.P(k, l) = select(where, Value(Lanes::load(from + offset)), belief.P(k, l));
-    }
-  }
+AUVEST_INLINE void load_belief(const typename Lanes::Scalar* from, Belief<Value, N>& belief) {
+  load_mean<Lanes>(from, belief.x);
+  load_covariance<Lanes>(from + N * kBlock, belief.P);
 }
 
 template <class Lanes, class Value, int N>
@@ -64,6 +54,16 @@ AUVEST_INLINE void store_belief(typename Lanes::Scalar* to, const Belief<Value, 
     AUVEST_UNROLL
     for (int l = 0; l <= k; ++l, offset += kBlock) Lanes::store(to + offset, belief.P(k, l));
   }
+}
+
+/// Stores the belief in the lanes of `where` only. (By value: the caller's own stays in registers.)
+template <class Lanes, class Value, int N>
+AUVEST_COLD void store_belief_where(math::Mask<Value> where, typename Lanes::Scalar* to,
+                                    Belief<Value, N> belief) {
+  Belief<Value, N> stored;
+  load_belief<Lanes>(to, stored);
+  math::copy_where(where, belief, stored);
+  store_belief<Lanes>(to, stored);
 }
 
 /// Calls f(at, k, l) for `count` numbers of the lower triangle of an N x N matrix from number

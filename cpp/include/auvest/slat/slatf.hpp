@@ -619,17 +619,19 @@ class Slatf {
   /// density, Eqs. (30) and (31), and 0 for 2.0, which has weighed already.
   template <class Fields, class V>
   AUVEST_INLINE V weigh(int i, int n, const Echoes& echoes, int s, Verdict<V>& verdict) const {
-    Belief<V, kPose> pose;
+    // What is read late takes no registers before.
+    Vector<V, kPose> pose;
     Belief<V, 6> master;
-    load_pose<Fields>(i, pose);
-    load_master<Fields>(i, n, master);
+    load_mean<Fields>(set_.at(i, kPoseField), pose);
+    load_mean<Fields>(master_at(i, n), master.x);
     View<V> view;
-    echoes.sonar.look(pose.x, master.x(0), master.x(1), echoes.sightings[s].z, view);
+    echoes.sonar.look(pose, master.x(0), master.x(1), echoes.sightings[s].z, view);
+    load_covariance<Fields>(master_at(i, n) + 6 * kBlock, master.P);
     const math::Mask<V> definite = math::factor_leading(master.P, verdict.root, verdict.slope);
     Matrix<V, 2, 2> a;
     project(view.by_master, verdict.root, a);
     Matrix<V, 2, 2> noise = echoes.sonar.template R<V>();
-    const math::Mask<V> finite = potter(a, noise, view.innovation, verdict.posterior);
+    const math::Mask<V> finite = potter<true>(a, noise, view.innovation, verdict.posterior);
     verdict.valid = finite && definite;
     if (params_.gate > Scalar(0)) saturate(V(gate()), verdict.posterior);
     return Proposal::kInformed ? V(0) : log_density(verdict.valid, verdict.posterior, noise);
@@ -674,12 +676,13 @@ class Slatf {
     const math::Mask<Value> finite =
         move_belief(master, verdict.root, verdict.slope, verdict.posterior);
     const math::Mask<Value> moved = finite && verdict.valid;
-    if (!all(moved)) {
-      reload_belief<Lanes>(!moved, set_.at(i, master_field(n)), master);
-      const math::Mask<Value> lost = verdict.valid && !finite;  // weighs nothing
-      if (!Proposal::kInformed) multiply_weight(i, select(lost, Value(-1e20), Value(0)));
+    if (all(moved)) {
+      store_master(i, n, master);
+      return;
     }
-    store_master(i, n, master);
+    store_belief_where<Lanes>(moved, master_at(i, n), master);
+    const math::Mask<Value> lost = verdict.valid && !finite;  // weighs nothing
+    if (!Proposal::kInformed) multiply_weight(i, select(lost, Value(-1e20), Value(0)));
   }
 
   /// The update of master n where it has several models: all at once, as their probabilities follow
@@ -713,7 +716,7 @@ class Slatf {
       Matrix<Value, 2, 2> noise = echoes.sonar.template R<Value>();
       Posterior<Value, 2> posterior;
       Echo<Value> echo;
-      echo.valid = potter(a, noise, view.innovation, posterior);
+      echo.valid = potter<true>(a, noise, view.innovation, posterior);
       echo.valid = echo.valid && definite;
       if (slatf.params_.gate > Scalar(0)) saturate(Value(slatf.gate()), posterior);
       echo.valid = echo.valid && move_belief(master, root, slope, posterior);
