@@ -80,6 +80,12 @@ inline float log(float x) {
   return detail::log_kernel(m, static_cast<float>(power));
 }
 
+/// e^x where that is a normal number.
+AUVEST_INLINE float exp_normal(float x) { return exp(x); }
+
+/// ln(x) for a positive normal number.
+AUVEST_INLINE float log_normal(float x) { return log(x); }
+
 namespace detail {
 
 /// The double functions, by the size of double.
@@ -99,6 +105,8 @@ struct DoubleExponential<4> {
 
 inline double exp(double x) { return detail::DoubleExponential<sizeof(double)>::exp(x); }
 inline double log(double x) { return detail::DoubleExponential<sizeof(double)>::log(x); }
+inline double exp_normal(double x) { return exp(x); }
+inline double log_normal(double x) { return log(x); }
 
 }  // namespace math
 }  // namespace auvest

@@ -39,9 +39,9 @@ template <class Value>
 AUVEST_INLINE void box_muller(const Value& u, const Value& v, Value& a, Value& b) {
   const Value above_zero = Value(1) - u;  // (0, 1], exact
   const Value angle_rad = two_pi<Value>() * v;
-  const Value radius = sqrt(Value(-2) * log(above_zero));
+  const Value radius = sqrt(Value(-2) * log_normal(above_zero));
   Value sine, cosine;
-  sincos(angle_rad, sine, cosine);
+  sincos_near(angle_rad, sine, cosine);
   a = radius * cosine;
   b = radius * sine;
 }

@@ -108,6 +108,11 @@ AUVEST_INLINE FloatBatch<Arch> larger(const FloatBatch<Arch>& a, const FloatBatc
 }
 
 template <class Arch>
+AUVEST_INLINE FloatBatch<Arch> smaller(const FloatBatch<Arch>& a, const FloatBatch<Arch>& b) {
+  return FloatBatch<Arch>(xsimd::min(b.v, a.v));
+}
+
+template <class Arch>
 AUVEST_INLINE WordBatch<Arch> to_bits(const FloatBatch<Arch>& x) {
   return WordBatch<Arch>(xsimd::bitwise_cast<xsimd::batch<uint32_t, Arch>>(x.v));
 }
@@ -120,6 +125,14 @@ template <class Arch>
 AUVEST_INLINE FloatBatch<Arch> to_float(const WordBatch<Arch>& word) {
   return FloatBatch<Arch>(
       xsimd::to_float(xsimd::bitwise_cast<xsimd::batch<int32_t, Arch>>(word.v)));
+}
+
+/// As a mask of floats.
+template <class Value, class Arch>
+AUVEST_INLINE Mask<Value> is_odd(const WordBatch<Arch>& word) {
+  using Integers = xsimd::batch<int32_t, Arch>;
+  const Integers last = xsimd::bitwise_cast<Integers>((word & WordBatch<Arch>(1u)).v);
+  return xsimd::bool_cast(last == Integers(1));
 }
 
 template <class Arch>
@@ -176,50 +189,67 @@ AUVEST_INLINE FloatBatch<Arch> copy_sign(const FloatBatch<Arch>& x, const FloatB
 }
 
 template <class Arch>
-AUVEST_INLINE FloatBatch<Arch> exp(const FloatBatch<Arch>& x) {
-  using Value = FloatBatch<Arch>;
-  // Results that are normal numbers.
-  if (!xsimd::all(x >= Value(-87.0f) && x <= Value(88.7228317f))) {
-    return detail::lane_by_lane(x, [](float lane) { return math::exp(lane); });
-  }
-  Value shifted;
-  const Value e = detail::exp_kernel(x, shifted);
-  return from_bits(to_bits(e) + ((to_bits(shifted) + WordBatch<Arch>(0u - 0x4b400000u)) << 23));
+AUVEST_INLINE FloatBatch<Arch> exp_normal(const FloatBatch<Arch>& x) {
+  FloatBatch<Arch> shifted;
+  const FloatBatch<Arch> e = detail::exp_kernel(x, shifted);
+  return from_bits(to_bits(e) + (to_bits(shifted) << 23));  // of its bits only k is left
 }
 
 template <class Arch>
-AUVEST_INLINE FloatBatch<Arch> log(const FloatBatch<Arch>& x) {
+AUVEST_INLINE FloatBatch<Arch> exp(const FloatBatch<Arch>& x) {
+  using Value = FloatBatch<Arch>;
+  if (!xsimd::all(x >= Value(-87.0f) && x <= Value(88.7228317f))) {
+    return detail::lane_by_lane(x, [](float lane) { return math::exp(lane); });
+  }
+  return exp_normal(x);
+}
+
+template <class Arch>
+AUVEST_INLINE FloatBatch<Arch> log_normal(const FloatBatch<Arch>& x) {
   using Value = FloatBatch<Arch>;
   using Word = WordBatch<Arch>;
-  if (!xsimd::all(x >= Value(1.17549435e-38f) && x <= Value(3.40282347e+38f))) {
-    return detail::lane_by_lane(x, [](float lane) { return math::log(lane); });
-  }
   const Word bits = to_bits(x) + Word(0x3f800000u - 0x3f3504f3u);
   const Value m = from_bits((bits & Word(0x007fffffu)) + Word(0x3f3504f3u));
   return detail::log_kernel(m, Value(to_float(bits >> 23) - Value(127.0f)));
 }
 
 template <class Arch>
-AUVEST_INLINE void sincos(const FloatBatch<Arch>& x, FloatBatch<Arch>& s, FloatBatch<Arch>& c) {
+AUVEST_INLINE FloatBatch<Arch> log(const FloatBatch<Arch>& x) {
+  using Value = FloatBatch<Arch>;
+  if (!xsimd::all(x >= Value(1.17549435e-38f) && x <= Value(3.40282347e+38f))) {
+    return detail::lane_by_lane(x, [](float lane) { return math::log(lane); });
+  }
+  return log_normal(x);
+}
+
+template <class Arch>
+AUVEST_INLINE void sincos_near(const FloatBatch<Arch>& x, FloatBatch<Arch>& s,
+                               FloatBatch<Arch>& c) {
   using Value = FloatBatch<Arch>;
   using Word = WordBatch<Arch>;
-  const Value size = absolute(x);
-  if (!xsimd::all(size <= Value(96.0f))) {
-    s = detail::lane_by_lane(x, [](float lane) { return math::sin(lane); });
-    c = detail::lane_by_lane(x, [](float lane) { return math::cos(lane); });
-    return;
-  }
   // Up to pi/4, where the scalar code does not reduce, k is 0 and nothing is subtracted.
   Value shifted;
   const Value angle = detail::reduce_near(x, shifted);
   const Word quarter = to_bits(shifted);
   const Value sine = detail::sin_kernel(angle);
   const Value cosine = detail::cos_kernel(angle);
-  const auto odd = to_float(quarter & Word(1u)) > Value(0.0f);
-  const Word sign_s = (quarter & Word(2u)) << 30;
-  const Word sign_c = ((quarter + Word(1u)) & Word(2u)) << 30;
+  const Mask<Value> odd = is_odd<Value>(quarter);
+  const Word sign_s = (quarter << 30) & Word(0x80000000u);
+  const Word sign_c = ((quarter + Word(1u)) << 30) & Word(0x80000000u);
   s = from_bits(to_bits(select(odd, cosine, sine)) ^ sign_s);
   c = from_bits(to_bits(select(odd, sine, cosine)) ^ sign_c);
+}
+
+template <class Arch>
+AUVEST_INLINE void sincos(const FloatBatch<Arch>& x, FloatBatch<Arch>& s, FloatBatch<Arch>& c) {
+  using Value = FloatBatch<Arch>;
+  const Value size = absolute(x);
+  if (!xsimd::all(size <= Value(96.0f))) {
+    s = detail::lane_by_lane(x, [](float lane) { return math::sin(lane); });
+    c = detail::lane_by_lane(x, [](float lane) { return math::cos(lane); });
+    return;
+  }
+  sincos_near(x, s, c);
   s = select(size < Value(2.44140625e-04f), x, s);  // 2^-12
 }
 
@@ -229,10 +259,8 @@ AUVEST_INLINE FloatBatch<Arch> atan2(const FloatBatch<Arch>& y, const FloatBatch
   const Value zero(0.0f);
   const Value size_x = absolute(x);
   const Value size_y = absolute(y);
-  const Value small = select(size_x < size_y, size_x, size_y);
   const auto steep = size_y > size_x;
-  const Value large = select(steep, size_y, size_x);
-  const Value ratio = small / large;
+  const Value ratio = smaller(size_y, size_x) / larger(size_x, size_y);  // NaN if one is
   if (!xsimd::all(ratio >= Value(7.88860905e-31f) && ratio <= Value(1.0f))) {  // 2^-100
     return detail::lane_by_lane(y, x, [](float a, float b) { return math::atan2(a, b); });
   }
@@ -240,7 +268,7 @@ AUVEST_INLINE FloatBatch<Arch> atan2(const FloatBatch<Arch>& y, const FloatBatch
   const Value high = select(steep, Value(1.57079637f), select(left, Value(3.14159274f), zero));
   const Value low =
       select(steep, Value(-4.37113883e-08f), select(left, Value(-8.74227766e-08f), zero));
-  const Value z = select(steep, select(left, ratio, -ratio), select(left, -ratio, ratio));
+  const Value z = select(steep != left, -ratio, ratio);
   const Value u = ratio * ratio;
   const Value bent = low + z * (u * detail::atan_polynomial(u));
   const Value tail = select(ratio >= Value(2.44140625e-04f), bent, low);  // 2^-12

@@ -97,6 +97,12 @@ struct Twin {
   friend AUVEST_INLINE Twin sqrt(const Twin& x) { return Twin(sqrt(x.a), sqrt(x.b)); }
   friend AUVEST_INLINE Twin exp(const Twin& x) { return Twin(exp(x.a), exp(x.b)); }
   friend AUVEST_INLINE Twin log(const Twin& x) { return Twin(log(x.a), log(x.b)); }
+  friend AUVEST_INLINE Twin exp_normal(const Twin& x) {
+    return Twin(exp_normal(x.a), exp_normal(x.b));
+  }
+  friend AUVEST_INLINE Twin log_normal(const Twin& x) {
+    return Twin(log_normal(x.a), log_normal(x.b));
+  }
   friend AUVEST_INLINE Twin wrap(const Twin& x) { return Twin(wrap(x.a), wrap(x.b)); }
   friend AUVEST_INLINE Twin atan2(const Twin& y, const Twin& x) {
     return Twin(atan2(y.a, x.a), atan2(y.b, x.b));
@@ -104,6 +110,10 @@ struct Twin {
   friend AUVEST_INLINE void sincos(const Twin& x, Twin& s, Twin& c) {
     sincos(x.a, s.a, c.a);
     sincos(x.b, s.b, c.b);
+  }
+  friend AUVEST_INLINE void sincos_near(const Twin& x, Twin& s, Twin& c) {
+    sincos_near(x.a, s.a, c.a);
+    sincos_near(x.b, s.b, c.b);
   }
 };
 

@@ -18,11 +18,11 @@ constexpr Scalar no_log_weight() {
 /// The weight of a logarithm <= 0. Below e^-80, and for a NaN, 0: no subnormal number arises.
 template <class Value>
 AUVEST_INLINE Value weight_of(const Value& log_weight) {
-  using math::exp;
+  using math::exp_normal;
   using math::select;
   const Value least(-80);
   const auto heavy = log_weight > least;
-  return select(heavy, exp(select(heavy, log_weight, least)), Value(0));
+  return select(heavy, exp_normal(select(heavy, log_weight, least)), Value(0));
 }
 
 template <class Scalar>
@@ -41,14 +41,18 @@ inline WeightSummary<typename Lanes::Scalar> normalise(const Set& set) {
   using Value = typename Lanes::Value;
   const int n = set.size();
   Scalar* log_weights = set.log_weights();
-  Scalar most[kBlock];
-  for (int i = 0; i < kBlock; ++i) most[i] = no_log_weight<Scalar>();
+  Value most[kBlock / Lanes::kWidth];
+  for (Value& best : most) best = Value(no_log_weight<Scalar>());
   for (int i = 0; i < n; i += Lanes::kWidth) {
-    Scalar* best = most + place_in_block(i);
-    Lanes::store(best, larger(Lanes::load(best), Lanes::load(log_weights + i)));
+    Value& best = most[place_in_block(i) / Lanes::kWidth];
+    best = larger(best, Value(Lanes::load(log_weights + i)));
   }
-  Scalar largest = most[0];
-  for (int i = 1; i < kBlock; ++i) largest = larger(largest, most[i]);
+  Scalar lanes[kBlock];
+  for (int i = 0; i < kBlock; i += Lanes::kWidth) Lanes::store(lanes + i, most[i / Lanes::kWidth]);
+  for (int half = kBlock / 2; half > 0; half /= 2) {
+    for (int i = 0; i < half; ++i) lanes[i] = larger(lanes[i], lanes[i + half]);
+  }
+  const Scalar largest = lanes[0];
 
   OrderedSum<Lanes> sum;
   OrderedSum<Lanes> squares;
