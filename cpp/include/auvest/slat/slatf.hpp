@@ -290,17 +290,20 @@ class Slatf {
   // side by side: the processor has something to do, and the tile stays in the cache.
   static constexpr int kTileGroups = Lanes::kPairs ? 4 : 1;
   static constexpr int kTile = kTileGroups * Lanes::kWidth;
-  static constexpr int kNearParticles = 10000;  // fit into a second-level cache
+  static constexpr int kNearParticles =  // fit into a first-level cache
+      32768 / static_cast<int>(sizeof(Scalar) * (1 + Set::kFields));
 
   /// One group of particles, or two that lie behind each other.
   struct Single {
     using Fields = Lanes;
     using Weights = Lanes;
+    static constexpr int kParticles = Lanes::kWidth;
   };
   struct Pair {
     using Weights = typename Lanes::template Pair<Lanes::kWidth>;
     using Fields = typename Lanes::template Pair<(Lanes::kWidth < kBlock) ? Lanes::kWidth
                                                                           : Set::kFields * kBlock>;
+    static constexpr int kParticles = 2 * Lanes::kWidth;
   };
 
   template <class Kernel>
@@ -313,6 +316,21 @@ class Slatf {
   /// True if at i a pair of groups begins that ends before the particle `end`.
   static AUVEST_INLINE bool is_pair(int i, int end) {
     return Lanes::kPairs && i + Lanes::kWidth < end;
+  }
+
+  /// Asks for a third of what the next tile holds in the place of group i; there, or in a pair, in
+  /// two. Spread over the kernels, so that the way to the cache is never full.
+  template <class Group, int Third>
+  AUVEST_INLINE void foresee(int i) const {
+    if (!Lanes::kPairs || set_.size() <= kNearParticles) return;
+    for (int k = i; k < i + Group::kParticles; k += Lanes::kWidth) {
+      if (place_in_block(k) != 0) continue;
+      constexpr int kFirst = Set::kFields * Third / 3;
+      constexpr int kCount = Set::kFields * (Third + 1) / 3 - kFirst;
+      const Scalar* at = set_.at(k + kTile, kFirst);
+      AUVEST_UNROLL
+      for (int f = 0; f < kCount; ++f) Lanes::prefetch(at + f * kBlock);
+    }
   }
 
   template <class Kernel>
@@ -426,12 +444,6 @@ class Slatf {
   bool births() const { return params_.birth_velocity_mps > Scalar(0) && masters_ < Masters; }
 
   AUVEST_INLINE void advance(int begin, int end, const Move& move) const {
-    // The poses take as long as the masters' way to the cache, where that is far.
-    if (Lanes::kPairs && set_.size() > kNearParticles) {
-      for (int block = begin; block < end; block += kBlock) {
-        for (int f = 0; f < Set::kFields; ++f) Lanes::prefetch(set_.at(block, f));
-      }
-    }
     int i = begin;
     for (; is_pair(i, end); i += 2 * Lanes::kWidth) advance_pose<Pair>(i, move);
     for (; i < end; i += Lanes::kWidth) advance_pose<Single>(i, move);
@@ -442,6 +454,7 @@ class Slatf {
   void advance_pose(int i, const Move& move) const {
     using Fields = typename Group::Fields;
     using V = typename Fields::Value;
+    foresee<Group, 0>(i);
     Belief<V, kPose> pose;
     load_pose<Fields>(i, pose);
     V a(0);
@@ -641,6 +654,7 @@ class Slatf {
   template <class Group>
   void weigh_known(int i, int n, const Echoes& echoes, int s, Verdict<Value>* verdicts) const {
     using Fields = typename Group::Fields;
+    foresee<Group, 1>(i);
     Verdict<typename Fields::Value> verdict;
     const typename Fields::Value density = weigh<Fields>(i, n, echoes, s, verdict);
     if (!Proposal::kInformed) multiply_weight<typename Group::Weights>(i, density);
@@ -671,6 +685,7 @@ class Slatf {
   void correct(int i, int n, Verdict<Value>& verdict) const {
     using math::all;
     using math::select;
+    foresee<Single, 2>(i);
     Belief<Value, 6> master;
     load_master(i, n, master);
     const math::Mask<Value> finite =
