@@ -628,24 +628,29 @@ class Slatf {
     draw_pose<Lanes>(i, echoes.key, root, pose);
   }
 
-  /// Sighting s as an echo of master n, Eqs. (18) to (24). Returns for 1.0 the logarithm of the
-  /// density, Eqs. (30) and (31), and 0 for 2.0, which has weighed already.
+  /// The regression of master n on its position.
+  template <class Fields, class V>
+  AUVEST_INLINE void regress(int i, int n, Verdict<V>& verdict) const {
+    Matrix<V, 6, 6> p;
+    load_covariance<Fields>(master_at(i, n) + 6 * kBlock, p);
+    verdict.valid = math::factor_leading(p, verdict.root, verdict.slope);
+  }
+
+  /// Sighting s as an echo of master n, Eqs. (18) to (24), after regress(). Returns for 1.0 the
+  /// logarithm of the density, Eqs. (30) and (31), and 0 for 2.0, which has weighed already.
   template <class Fields, class V>
   AUVEST_INLINE V weigh(int i, int n, const Echoes& echoes, int s, Verdict<V>& verdict) const {
-    // What is read late takes no registers before.
     Vector<V, kPose> pose;
-    Belief<V, 6> master;
+    Vector<V, 6> master;
     load_mean<Fields>(set_.at(i, kPoseField), pose);
-    load_mean<Fields>(master_at(i, n), master.x);
+    load_mean<Fields>(master_at(i, n), master);
     View<V> view;
-    echoes.sonar.look(pose, master.x(0), master.x(1), echoes.sightings[s].z, view);
-    load_covariance<Fields>(master_at(i, n) + 6 * kBlock, master.P);
-    const math::Mask<V> definite = math::factor_leading(master.P, verdict.root, verdict.slope);
+    echoes.sonar.look(pose, master(0), master(1), echoes.sightings[s].z, view);
     Matrix<V, 2, 2> a;
     project(view.by_master, verdict.root, a);
     Matrix<V, 2, 2> noise = echoes.sonar.template R<V>();
     const math::Mask<V> finite = potter<true>(a, noise, view.innovation, verdict.posterior);
-    verdict.valid = finite && definite;
+    verdict.valid = finite && verdict.valid;
     if (params_.gate > Scalar(0)) saturate(V(gate()), verdict.posterior);
     return Proposal::kInformed ? V(0) : log_density(verdict.valid, verdict.posterior, noise);
   }
@@ -656,25 +661,38 @@ class Slatf {
     using Fields = typename Group::Fields;
     foresee<Group, 1>(i);
     Verdict<typename Fields::Value> verdict;
+    regress<Fields>(i, n, verdict);
+    hand_out_regression(verdict, verdicts);
     const typename Fields::Value density = weigh<Fields>(i, n, echoes, s, verdict);
     if (!Proposal::kInformed) multiply_weight<typename Group::Weights>(i, density);
-    hand_out(verdict, verdicts);
+    hand_out_posterior(verdict, verdicts);
   }
 
   /// Weighs those particles of a group for which it is an echo of master n.
   void weigh_chosen(int i, int n, const Echoes& echoes, int s, const math::Mask<Value>& mine,
                     Verdict<Value>& verdict) const {
     using math::select;
+    regress<Lanes>(i, n, verdict);
     const Value density = weigh<Lanes>(i, n, echoes, s, verdict);
     multiply_weight(i, select(mine, density, Value(0)));
     verdict.valid = verdict.valid && mine;
   }
 
-  static AUVEST_INLINE void hand_out(const Verdict<Value>& from, Verdict<Value>* to) { *to = from; }
-
-  static AUVEST_INLINE void hand_out(const Verdict<math::Twin<Value>>& from, Verdict<Value>* to) {
+  // Each half as soon as it is known, for it takes no registers then.
+  using Verdicts = Verdict<math::Twin<Value>>;
+  static AUVEST_INLINE void hand_out_regression(const Verdict<Value>& from, Verdict<Value>* to) {
+    to->root = from.root;
+    to->slope = from.slope;
+  }
+  static AUVEST_INLINE void hand_out_regression(const Verdicts& from, Verdict<Value>* to) {
     math::split(from.root, to[0].root, to[1].root);
     math::split(from.slope, to[0].slope, to[1].slope);
+  }
+  static AUVEST_INLINE void hand_out_posterior(const Verdict<Value>& from, Verdict<Value>* to) {
+    to->posterior = from.posterior;
+    to->valid = from.valid;
+  }
+  static AUVEST_INLINE void hand_out_posterior(const Verdicts& from, Verdict<Value>* to) {
     math::split(from.posterior.y, to[0].posterior.y, to[1].posterior.y);
     math::split(from.posterior.g, to[0].posterior.g, to[1].posterior.g);
     to[0].valid = from.valid.a;
