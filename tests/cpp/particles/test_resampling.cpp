@@ -188,7 +188,7 @@ TEST_CASE("resample: from log weights, the mean stays") {
   }
   auvest::normalise<auvest::OneLane<float>>(set);
   Random random(13);
-  auvest::resample(auvest::SystematicResampling(), set, random);
+  auvest::resample<auvest::OneLane<float>>(auvest::SystematicResampling(), set, random);
   double after = 0;
   for (int i = 0; i < n; ++i) after += static_cast<double>(*set.at(i, 0)) / n;
   CHECK(std::fabs(after - mean / total) < 1.0 / n);  // systematic: within one spacing

@@ -14,6 +14,7 @@
 #include "auvest/math/exponential.hpp"
 #include "auvest/math/select.hpp"
 #include "auvest/math/trigonometry.hpp"
+#include "auvest/math/twin.hpp"
 
 namespace auvest {
 namespace math {
@@ -127,9 +128,9 @@ AUVEST_INLINE FloatBatch<Arch> to_float(const WordBatch<Arch>& word) {
       xsimd::to_float(xsimd::bitwise_cast<xsimd::batch<int32_t, Arch>>(word.v)));
 }
 
-/// As a mask of floats.
-template <class Value, class Arch>
-AUVEST_INLINE Mask<Value> is_odd(const WordBatch<Arch>& word) {
+/// The lanes of odd numbers.
+template <class Arch>
+AUVEST_INLINE Mask<FloatBatch<Arch>> ends_in_one(const WordBatch<Arch>& word) {
   using Integers = xsimd::batch<int32_t, Arch>;
   const Integers last = xsimd::bitwise_cast<Integers>((word & WordBatch<Arch>(1u)).v);
   return xsimd::bool_cast(last == Integers(1));
@@ -140,10 +141,9 @@ AUVEST_INLINE WordBatch<Arch> rotate_left(const WordBatch<Arch>& x, int count) {
   return (x << count) | (x >> (32 - count));
 }
 
-/// The upper 24 bits of a word as a fraction in [0, 1).
-template <class Value, class Arch>
-AUVEST_INLINE Value fraction_of(const WordBatch<Arch>& word) {
-  return to_float(word >> 8) * Value(5.9604644775390625e-08f);  // 2^-24
+template <class Arch>
+AUVEST_INLINE FloatBatch<Arch> sqrt(const FloatBatch<Arch>& x) {
+  return FloatBatch<Arch>(xsimd::sqrt(x.v));
 }
 
 namespace detail {
@@ -156,7 +156,6 @@ AUVEST_COLD FloatBatch<Arch> lane_by_lane(const FloatBatch<Arch>& x, Function fu
   for (float& lane : lanes) lane = function(lane);
   return FloatBatch<Arch>(xsimd::batch<float, Arch>::load_aligned(lanes));
 }
-
 template <class Arch, class Function>
 AUVEST_COLD FloatBatch<Arch> lane_by_lane(const FloatBatch<Arch>& x, const FloatBatch<Arch>& y,
                                           Function function) {
@@ -167,84 +166,105 @@ AUVEST_COLD FloatBatch<Arch> lane_by_lane(const FloatBatch<Arch>& x, const Float
   for (int i = 0; i < FloatBatch<Arch>::kWidth; ++i) lanes_x[i] = function(lanes_x[i], lanes_y[i]);
   return FloatBatch<Arch>(xsimd::batch<float, Arch>::load_aligned(lanes_x));
 }
+template <class Batch, class Function>
+AUVEST_INLINE Twin<Batch> lane_by_lane(const Twin<Batch>& x, Function function) {
+  return Twin<Batch>(lane_by_lane(x.a, function), lane_by_lane(x.b, function));
+}
+template <class Batch, class Function>
+AUVEST_INLINE Twin<Batch> lane_by_lane(const Twin<Batch>& x, const Twin<Batch>& y,
+                                       Function function) {
+  return Twin<Batch>(lane_by_lane(x.a, y.a, function), lane_by_lane(x.b, y.b, function));
+}
+
+/// The words of a batch, or of two side by side.
+template <class Value>
+struct WordOf;
+template <class Arch>
+struct WordOf<FloatBatch<Arch>> {
+  using Type = WordBatch<Arch>;
+};
+template <class Batch>
+struct WordOf<Twin<Batch>> {
+  using Type = TwinWord<typename WordOf<Batch>::Type>;
+};
 
 }  // namespace detail
 
-template <class Arch>
-AUVEST_INLINE FloatBatch<Arch> sqrt(const FloatBatch<Arch>& x) {
-  return FloatBatch<Arch>(xsimd::sqrt(x.v));
-}
-template <class Arch>
-AUVEST_INLINE FloatBatch<Arch> absolute(const FloatBatch<Arch>& x) {
-  return from_bits(to_bits(x) & WordBatch<Arch>(0x7fffffffu));
-}
-template <class Arch>
-AUVEST_INLINE Mask<FloatBatch<Arch>> is_finite(const FloatBatch<Arch>& x) {
-  return absolute(x) <= FloatBatch<Arch>(FLT_MAX);
-}
-template <class Arch>
-AUVEST_INLINE FloatBatch<Arch> copy_sign(const FloatBatch<Arch>& x, const FloatBatch<Arch>& y) {
-  return from_bits((to_bits(x) & WordBatch<Arch>(0x7fffffffu)) |
-                   (to_bits(y) & WordBatch<Arch>(0x80000000u)));
+// From here on a Value is a FloatBatch or a Twin.
+template <class Value>
+using WordOf = typename detail::WordOf<Value>::Type;
+
+/// The upper 24 bits of a word as a fraction in [0, 1).
+template <class Value>
+AUVEST_INLINE Value fraction_of(const WordOf<Value>& word) {
+  return to_float(word >> 8) * Value(5.9604644775390625e-08f);  // 2^-24
 }
 
-template <class Arch>
-AUVEST_INLINE FloatBatch<Arch> exp_normal(const FloatBatch<Arch>& x) {
-  FloatBatch<Arch> shifted;
-  const FloatBatch<Arch> e = detail::exp_kernel(x, shifted);
+template <class Value, class = WordOf<Value>>
+AUVEST_INLINE Value absolute(const Value& x) {
+  return from_bits(to_bits(x) & WordOf<Value>(0x7fffffffu));
+}
+template <class Value, class = WordOf<Value>>
+AUVEST_INLINE Mask<Value> is_finite(const Value& x) {
+  return absolute(x) <= Value(FLT_MAX);
+}
+template <class Value, class = WordOf<Value>>
+AUVEST_INLINE Value copy_sign(const Value& x, const Value& y) {
+  return from_bits((to_bits(x) & WordOf<Value>(0x7fffffffu)) |
+                   (to_bits(y) & WordOf<Value>(0x80000000u)));
+}
+
+template <class Value, class = WordOf<Value>>
+AUVEST_INLINE Value exp_normal(const Value& x) {
+  Value shifted;
+  const Value e = detail::exp_kernel(x, shifted);
   return from_bits(to_bits(e) + (to_bits(shifted) << 23));  // of its bits only k is left
 }
 
-template <class Arch>
-AUVEST_INLINE FloatBatch<Arch> exp(const FloatBatch<Arch>& x) {
-  using Value = FloatBatch<Arch>;
-  if (!xsimd::all(x >= Value(-87.0f) && x <= Value(88.7228317f))) {
+template <class Value, class = WordOf<Value>>
+AUVEST_INLINE Value exp(const Value& x) {
+  if (!all(x >= Value(-87.0f) && x <= Value(88.7228317f))) {
     return detail::lane_by_lane(x, [](float lane) { return math::exp(lane); });
   }
   return exp_normal(x);
 }
 
-template <class Arch>
-AUVEST_INLINE FloatBatch<Arch> log_normal(const FloatBatch<Arch>& x) {
-  using Value = FloatBatch<Arch>;
-  using Word = WordBatch<Arch>;
+template <class Value, class = WordOf<Value>>
+AUVEST_INLINE Value log_normal(const Value& x) {
+  using Word = WordOf<Value>;
   const Word bits = to_bits(x) + Word(0x3f800000u - 0x3f3504f3u);
   const Value m = from_bits((bits & Word(0x007fffffu)) + Word(0x3f3504f3u));
   return detail::log_kernel(m, Value(to_float(bits >> 23) - Value(127.0f)));
 }
 
-template <class Arch>
-AUVEST_INLINE FloatBatch<Arch> log(const FloatBatch<Arch>& x) {
-  using Value = FloatBatch<Arch>;
-  if (!xsimd::all(x >= Value(1.17549435e-38f) && x <= Value(3.40282347e+38f))) {
+template <class Value, class = WordOf<Value>>
+AUVEST_INLINE Value log(const Value& x) {
+  if (!all(x >= Value(1.17549435e-38f) && x <= Value(3.40282347e+38f))) {
     return detail::lane_by_lane(x, [](float lane) { return math::log(lane); });
   }
   return log_normal(x);
 }
 
-template <class Arch>
-AUVEST_INLINE void sincos_near(const FloatBatch<Arch>& x, FloatBatch<Arch>& s,
-                               FloatBatch<Arch>& c) {
-  using Value = FloatBatch<Arch>;
-  using Word = WordBatch<Arch>;
+template <class Value, class = WordOf<Value>>
+AUVEST_INLINE void sincos_near(const Value& x, Value& s, Value& c) {
+  using Word = WordOf<Value>;
   // Up to pi/4, where the scalar code does not reduce, k is 0 and nothing is subtracted.
   Value shifted;
   const Value angle = detail::reduce_near(x, shifted);
   const Word quarter = to_bits(shifted);
   const Value sine = detail::sin_kernel(angle);
   const Value cosine = detail::cos_kernel(angle);
-  const Mask<Value> odd = is_odd<Value>(quarter);
+  const Mask<Value> odd = ends_in_one(quarter);
   const Word sign_s = (quarter << 30) & Word(0x80000000u);
   const Word sign_c = ((quarter + Word(1u)) << 30) & Word(0x80000000u);
   s = from_bits(to_bits(select(odd, cosine, sine)) ^ sign_s);
   c = from_bits(to_bits(select(odd, sine, cosine)) ^ sign_c);
 }
 
-template <class Arch>
-AUVEST_INLINE void sincos(const FloatBatch<Arch>& x, FloatBatch<Arch>& s, FloatBatch<Arch>& c) {
-  using Value = FloatBatch<Arch>;
+template <class Value, class = WordOf<Value>>
+AUVEST_INLINE void sincos(const Value& x, Value& s, Value& c) {
   const Value size = absolute(x);
-  if (!xsimd::all(size <= Value(96.0f))) {
+  if (!all(size <= Value(96.0f))) {
     s = detail::lane_by_lane(x, [](float lane) { return math::sin(lane); });
     c = detail::lane_by_lane(x, [](float lane) { return math::cos(lane); });
     return;
@@ -253,35 +273,33 @@ AUVEST_INLINE void sincos(const FloatBatch<Arch>& x, FloatBatch<Arch>& s, FloatB
   s = select(size < Value(2.44140625e-04f), x, s);  // 2^-12
 }
 
-template <class Arch>
-AUVEST_INLINE FloatBatch<Arch> atan2(const FloatBatch<Arch>& y, const FloatBatch<Arch>& x) {
-  using Value = FloatBatch<Arch>;
+template <class Value, class = WordOf<Value>>
+AUVEST_INLINE Value atan2(const Value& y, const Value& x) {
   const Value zero(0.0f);
   const Value size_x = absolute(x);
   const Value size_y = absolute(y);
   const auto steep = size_y > size_x;
   const Value ratio = smaller(size_y, size_x) / larger(size_x, size_y);  // NaN if one is
-  if (!xsimd::all(ratio >= Value(7.88860905e-31f) && ratio <= Value(1.0f))) {  // 2^-100
+  if (!all(ratio >= Value(7.88860905e-31f) && ratio <= Value(1.0f))) {   // 2^-100
     return detail::lane_by_lane(y, x, [](float a, float b) { return math::atan2(a, b); });
   }
   const auto left = x < zero;
   const Value high = select(steep, Value(1.57079637f), select(left, Value(3.14159274f), zero));
   const Value low =
       select(steep, Value(-4.37113883e-08f), select(left, Value(-8.74227766e-08f), zero));
-  const Value z = select(steep != left, -ratio, ratio);
+  const Value z = select(steep ^ left, -ratio, ratio);
   const Value u = ratio * ratio;
   const Value bent = low + z * (u * detail::atan_polynomial(u));
   const Value tail = select(ratio >= Value(2.44140625e-04f), bent, low);  // 2^-12
   return copy_sign(Value((high + z) + tail), y);
 }
 
-template <class Arch>
-AUVEST_INLINE FloatBatch<Arch> wrap(const FloatBatch<Arch>& a) {
-  using Value = FloatBatch<Arch>;
+template <class Value, class = WordOf<Value>>
+AUVEST_INLINE Value wrap(const Value& a) {
   const Mask<Value> inside = a > Value(-pi<float>()) && a <= Value(pi<float>());
-  if (xsimd::all(inside)) return a;
+  if (all(inside)) return a;
   const Value size = absolute(a);
-  if (!xsimd::all(size <= Value(9.424777f))) {
+  if (!all(size <= Value(9.424777f))) {
     return detail::lane_by_lane(a, [](float lane) { return math::wrap(lane); });
   }
   const Value turned = (size - Value(6.28318548f)) + Value(1.74845553e-07f);

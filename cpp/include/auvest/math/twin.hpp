@@ -25,6 +25,9 @@ struct TwinMask {
     return TwinMask(x.a || y.a, x.b || y.b);
   }
   AUVEST_INLINE TwinMask operator!() const { return TwinMask(!a, !b); }
+  friend AUVEST_INLINE TwinMask operator^(const TwinMask& x, const TwinMask& y) {
+    return TwinMask(x.a ^ y.a, x.b ^ y.b);
+  }
   friend AUVEST_INLINE bool any(const TwinMask& x) { return any(x.a) || any(x.b); }
   friend AUVEST_INLINE bool all(const TwinMask& x) { return all(x.a) && all(x.b); }
 };
@@ -42,6 +45,18 @@ struct TwinWord {
   }
   friend AUVEST_INLINE TwinWord operator^(const TwinWord& x, const TwinWord& y) {
     return TwinWord(x.a ^ y.a, x.b ^ y.b);
+  }
+  friend AUVEST_INLINE TwinWord operator&(const TwinWord& x, const TwinWord& y) {
+    return TwinWord(x.a & y.a, x.b & y.b);
+  }
+  friend AUVEST_INLINE TwinWord operator|(const TwinWord& x, const TwinWord& y) {
+    return TwinWord(x.a | y.a, x.b | y.b);
+  }
+  friend AUVEST_INLINE TwinWord operator<<(const TwinWord& x, int count) {
+    return TwinWord(x.a << count, x.b << count);
+  }
+  friend AUVEST_INLINE TwinWord operator>>(const TwinWord& x, int count) {
+    return TwinWord(x.a >> count, x.b >> count);
   }
   friend AUVEST_INLINE TwinWord rotate_left(const TwinWord& x, int count) {
     return TwinWord(rotate_left(x.a, count), rotate_left(x.b, count));
@@ -91,30 +106,10 @@ struct Twin {
   friend AUVEST_INLINE Twin larger(const Twin& x, const Twin& y) {
     return Twin(larger(x.a, y.a), larger(x.b, y.b));
   }
-  friend AUVEST_INLINE TwinMask is_finite(const Twin& x) {
-    return TwinMask(is_finite(x.a), is_finite(x.b));
+  friend AUVEST_INLINE Twin smaller(const Twin& x, const Twin& y) {
+    return Twin(smaller(x.a, y.a), smaller(x.b, y.b));
   }
   friend AUVEST_INLINE Twin sqrt(const Twin& x) { return Twin(sqrt(x.a), sqrt(x.b)); }
-  friend AUVEST_INLINE Twin exp(const Twin& x) { return Twin(exp(x.a), exp(x.b)); }
-  friend AUVEST_INLINE Twin log(const Twin& x) { return Twin(log(x.a), log(x.b)); }
-  friend AUVEST_INLINE Twin exp_normal(const Twin& x) {
-    return Twin(exp_normal(x.a), exp_normal(x.b));
-  }
-  friend AUVEST_INLINE Twin log_normal(const Twin& x) {
-    return Twin(log_normal(x.a), log_normal(x.b));
-  }
-  friend AUVEST_INLINE Twin wrap(const Twin& x) { return Twin(wrap(x.a), wrap(x.b)); }
-  friend AUVEST_INLINE Twin atan2(const Twin& y, const Twin& x) {
-    return Twin(atan2(y.a, x.a), atan2(y.b, x.b));
-  }
-  friend AUVEST_INLINE void sincos(const Twin& x, Twin& s, Twin& c) {
-    sincos(x.a, s.a, c.a);
-    sincos(x.b, s.b, c.b);
-  }
-  friend AUVEST_INLINE void sincos_near(const Twin& x, Twin& s, Twin& c) {
-    sincos_near(x.a, s.a, c.a);
-    sincos_near(x.b, s.b, c.b);
-  }
 };
 
 template <class Value>
@@ -122,10 +117,21 @@ struct ScalarOf<Twin<Value>> {
   using Type = typename ScalarOf<Value>::Type;
 };
 
-template <class Result, class Word>
-AUVEST_INLINE Result fraction_of(const TwinWord<Word>& word) {
-  using Value = decltype(Result().a);
-  return Result(fraction_of<Value>(word.a), fraction_of<Value>(word.b));
+template <class Value>
+AUVEST_INLINE auto to_bits(const Twin<Value>& x) -> TwinWord<decltype(to_bits(x.a))> {
+  return TwinWord<decltype(to_bits(x.a))>(to_bits(x.a), to_bits(x.b));
+}
+template <class Word>
+AUVEST_INLINE auto from_bits(const TwinWord<Word>& x) -> Twin<decltype(from_bits(x.a))> {
+  return Twin<decltype(from_bits(x.a))>(from_bits(x.a), from_bits(x.b));
+}
+template <class Word>
+AUVEST_INLINE auto to_float(const TwinWord<Word>& x) -> Twin<decltype(to_float(x.a))> {
+  return Twin<decltype(to_float(x.a))>(to_float(x.a), to_float(x.b));
+}
+template <class Word>
+AUVEST_INLINE auto ends_in_one(const TwinWord<Word>& x) -> TwinMask<decltype(ends_in_one(x.a))> {
+  return TwinMask<decltype(ends_in_one(x.a))>(ends_in_one(x.a), ends_in_one(x.b));
 }
 
 template <class Value, int Rows, int Cols>

@@ -171,10 +171,12 @@ inline void redistribute(const Set& set) {
 }
 
 /// Resamples the normalised set by the policy.
-template <class Policy, class Set>
+template <class Lanes, class Policy, class Set>
 inline void resample(const Policy& policy, const Set& set, math::Random& random) {
   typename Set::Scalar* weights = set.log_weights();
-  for (int i = 0; i < set.size(); ++i) weights[i] = weight_of(weights[i]);
+  for (int i = 0; i < set.size(); i += Lanes::kWidth) {
+    Lanes::store(weights + i, weight_of(Lanes::load(weights + i)));
+  }
   policy.count(weights, set.size(), random);
   redistribute(set);
 }

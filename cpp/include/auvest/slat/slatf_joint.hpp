@@ -289,7 +289,7 @@ class SlatfJoint {
     log_likelihood_ =
         log_likelihood_ + (summary.log_sum - Scalar(count) * Scalar(1.8378770664));  // log(2 pi)
     if (effective_size_ < params_.resample_below * Scalar(set_.size())) {
-      resample(resampling_, set_, random);
+      resample<Lanes>(resampling_, set_, random);
       ++resamplings_;
     }
   }
