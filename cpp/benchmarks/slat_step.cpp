@@ -27,7 +27,15 @@ using auvest::Vector;
 
 #if defined(AUVEST_SIMD_ARCH)
 using Lanes = auvest::SimdLanes<xsimd::AUVEST_SIMD_ARCH>;
-bool processor_has_lanes() { return xsimd::available_architectures().AUVEST_SIMD_ARCH != 0; }
+bool processor_has_lanes() {
+#if defined(__AVX512F__)
+  if (!__builtin_cpu_supports("avx512dq") || !__builtin_cpu_supports("avx512bw") ||
+      !__builtin_cpu_supports("avx512vl")) {
+    return false;
+  }
+#endif
+  return xsimd::available_architectures().AUVEST_SIMD_ARCH != 0;
+}
 #else
 using Lanes = auvest::OneLane<float>;
 bool processor_has_lanes() { return true; }
