@@ -73,6 +73,8 @@ namespace math {
 
 inline ExplicitDouble exp(ExplicitDouble x) { return ExplicitDouble(exp(double(x))); }
 inline ExplicitDouble log(ExplicitDouble x) { return ExplicitDouble(log(double(x))); }
+inline ExplicitDouble exp_normal(ExplicitDouble x) { return exp(x); }
+inline ExplicitDouble log_normal(ExplicitDouble x) { return log(x); }
 inline ExplicitDouble sqrt(ExplicitDouble x) { return ExplicitDouble(sqrt(double(x))); }
 inline bool is_finite(ExplicitDouble x) { return is_finite(double(x)); }
 inline ExplicitDouble wrap(ExplicitDouble x) { return ExplicitDouble(wrap(double(x))); }
@@ -87,6 +89,9 @@ inline void sincos(ExplicitDouble x, ExplicitDouble& s, ExplicitDouble& c) {
   c = ExplicitDouble(cosine);
 }
 inline void sincos_near(ExplicitDouble x, ExplicitDouble& s, ExplicitDouble& c) { sincos(x, s, c); }
+inline void sincos_positive(ExplicitDouble x, ExplicitDouble& s, ExplicitDouble& c) {
+  sincos(x, s, c);
+}
 
 }  // namespace math
 }  // namespace auvest

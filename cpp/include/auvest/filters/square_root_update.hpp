@@ -103,9 +103,10 @@ AUVEST_INLINE void innovation_covariance(const Matrix<Value, 1, 2>& a,
 /// math::ldlt leaves it. Uses up `a`; leaves the variances s on the diagonal of `noise`, whose
 /// product is the determinant of S. False where the result would not be finite.
 ///
-/// The first measurement meets y = 0 and G = I, and with `Independent` E is diagonal. Batches skip
-/// what these multiply: a zero would at most change the sign of another in f, v and `surprise`, and
-/// they are only added to numbers of which none is -0. (One number does not: code costs flash.)
+/// With `Independent` E is diagonal: nothing to decorrelate. The first measurement meets y = 0 and
+/// G = I: batches leave out what these multiply. (Numbers do not: code costs flash.) Neither
+/// changes a bit: at most the signs of zeros in f, v and `surprise`, and what these are added to is
+/// not -0.
 template <bool Independent = false, class Value, int M, int O>
 AUVEST_OUTLINE AUVEST_INLINE math::Mask<Value> potter(Matrix<Value, M, O>& a,
                                                       Matrix<Value, M, M>& noise,
@@ -127,7 +128,7 @@ AUVEST_OUTLINE AUVEST_INLINE math::Mask<Value> potter(Matrix<Value, M, O>& a,
   for (int m = 0; m < M; ++m) {
     Value* const row = &a(m, 0);
     const bool first = !math::is_number<Value>() && m == 0;
-    const int correlated = !math::is_number<Value>() && Independent ? 0 : m;
+    const int correlated = Independent ? 0 : m;
     residual(m) = math::minus_dot(innovation(m), &noise(m, 0), residual.data(), correlated);
     AUVEST_UNROLL
     for (int l = 0; l < correlated; ++l) add_scaled(-noise(m, l), &a(l, 0), row, O);

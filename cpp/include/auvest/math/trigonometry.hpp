@@ -338,6 +338,9 @@ inline void sincos(float x, float& s, float& c) {
   if (size < 0x39800000u) s = x;
 }
 
+/// s = sin(x), c = cos(x) for 0 <= x <= 96: for batches, which need not look for other x.
+AUVEST_INLINE void sincos_positive(float x, float& s, float& c) { sincos(x, s, c); }
+
 /// The angle of the point (x, y) in rad, in [-pi, pi], with C99's results for signed zeros and
 /// infinities. A NaN gives NaN.
 AUVEST_OUTLINE AUVEST_INLINE float atan2(float y, float x) {
@@ -381,6 +384,7 @@ inline void sincos(double x, double& s, double& c) {
   detail::DoubleTrigonometry<sizeof(double)>::sincos(x, s, c);
 }
 inline void sincos_near(double x, double& s, double& c) { sincos(x, s, c); }
+inline void sincos_positive(double x, double& s, double& c) { sincos(x, s, c); }
 AUVEST_INLINE double atan2(double y, double x) {
   return detail::DoubleTrigonometry<sizeof(double)>::atan2(y, x);
 }

@@ -56,14 +56,30 @@ AUVEST_INLINE void store_belief(typename Lanes::Scalar* to, const Belief<Value, 
   }
 }
 
-/// Stores the belief in the lanes of `where` only. (By value: the caller's own stays in registers.)
+namespace detail {
+
+/// By value: the caller's own belief stays in registers.
 template <class Lanes, class Value, int N>
-AUVEST_COLD void store_belief_where(math::Mask<Value> where, typename Lanes::Scalar* to,
-                                    Belief<Value, N> belief) {
+AUVEST_COLD void store_lanes(math::Mask<Value> where, typename Lanes::Scalar* to,
+                             Belief<Value, N> belief) {
   Belief<Value, N> stored;
   load_belief<Lanes>(to, stored);
   math::copy_where(where, belief, stored);
   store_belief<Lanes>(to, stored);
+}
+
+}  // namespace detail
+
+/// Stores the belief in the lanes of `where` only: mostly all.
+template <class Lanes, class Value, int N>
+AUVEST_INLINE void store_belief_where(const math::Mask<Value>& where, typename Lanes::Scalar* to,
+                                      const Belief<Value, N>& belief) {
+  using math::all;
+  if (all(where)) {
+    store_belief<Lanes>(to, belief);
+  } else if (!math::is_number<Value>()) {
+    detail::store_lanes<Lanes>(where, to, belief);
+  }
 }
 
 /// Calls f(at, k, l) for `count` numbers of the lower triangle of an N x N matrix from number

@@ -28,12 +28,8 @@ AUVEST_INLINE Value correct_stored(const Ekf& ekf, const math::Mask<Value>* only
   const Echo<Value> echo = ekf(belief);
   math::Mask<Value> moved = echo.valid;
   if (only != nullptr) moved = moved && *only;
-  if (all(moved)) {
-    store_belief<Lanes>(at, belief);
-  } else {
-    store_belief_where<Lanes>(moved, at, belief);
-    load_belief<Lanes>(at, belief);
-  }
+  store_belief_where<Lanes>(moved, at, belief);
+  if (!all(moved)) load_belief<Lanes>(at, belief);
   return echo.log_density;
 }
 

@@ -130,7 +130,9 @@ class Slatf {
         drawn.x(k) = Value(pose.x(k));
         for (int l = 0; l < kPose; ++l) spread(k, l) = Value(root(k, l));
       }
-      draw<Lanes>(key, i, spread, drawn.x);
+      Value e[kPose + 1];
+      deviates<Lanes>(key, i, e);
+      scatter(spread, e, drawn.x);
       store_pose(i, drawn);
     });
     return Status::kOk;
@@ -379,15 +381,19 @@ class Slatf {
     Weights::store(at, Weights::load(at) + log_factor);
   }
 
-  /// x <- x + root e, e ~ N(0, I).
+  /// e ~ N(0, I); the last is left over where the pose is odd.
   template <class Fields, class V>
-  static AUVEST_INLINE void draw(const math::CounterKey& key, int i,
-                                 const Matrix<V, kPose, kPose>& root, Vector<V, kPose>& x) {
-    V e[kPose + 1];
+  static AUVEST_INLINE void deviates(const math::CounterKey& key, int i, V (&e)[kPose + 1]) {
     for (int k = 0; k < kPose; k += 2) {
       math::counter_normal_pair(key, Fields::index(i), static_cast<uint32_t>(k / 2), e[k],
                                 e[k + 1]);
     }
+  }
+
+  /// x <- x + root e.
+  template <class V>
+  static AUVEST_INLINE void scatter(const Matrix<V, kPose, kPose>& root, const V (&e)[kPose + 1],
+                                    Vector<V, kPose>& x) {
     AUVEST_UNROLL
     for (int k = 0; k < kPose; ++k) {
       V sum = root(k, 0) * e[0];
@@ -571,6 +577,8 @@ class Slatf {
     using Fields = typename Group::Fields;
     using V = typename Fields::Value;
     Belief<V, kPose> pose;
+    V e[kPose + 1];  // first: while the rest waits for roots and quotients
+    deviates<Fields>(echoes.key, i, e);
     load_pose<Fields>(i, pose);
     V log_weight(0);
     Matrix<V, kPose, kPose> root;
@@ -583,13 +591,13 @@ class Slatf {
                                                             source.root, V(gate()), pose, root);
     }
     multiply_weight<typename Group::Weights>(i, log_weight);
-    draw_pose<Fields>(i, echoes.key, root, pose);
+    draw_pose<Fields>(i, root, e, pose);
   }
 
   template <class Fields, class V>
-  AUVEST_INLINE void draw_pose(int i, const math::CounterKey& key,
-                               const Matrix<V, kPose, kPose>& root, Belief<V, kPose>& pose) const {
-    draw<Fields>(key, i, root, pose.x);
+  AUVEST_INLINE void draw_pose(int i, const Matrix<V, kPose, kPose>& root, const V (&e)[kPose + 1],
+                               Belief<V, kPose>& pose) const {
+    scatter(root, e, pose.x);
     if (!params_.carry_covariance) math::set_zero(pose.P);
     store_pose<Fields>(i, pose);
   }
@@ -625,7 +633,9 @@ class Slatf {
     }
     if (!Proposal::kInformed) return;
     multiply_weight(i, log_weight);
-    draw_pose<Lanes>(i, echoes.key, root, pose);
+    Value e[kPose + 1];
+    deviates<Lanes>(echoes.key, i, e);
+    draw_pose<Lanes>(i, root, e, pose);
   }
 
   /// The regression of master n on its position.
@@ -641,7 +651,7 @@ class Slatf {
   template <class Fields, class V>
   AUVEST_INLINE V weigh(int i, int n, const Echoes& echoes, int s, Verdict<V>& verdict) const {
     Vector<V, kPose> pose;
-    Vector<V, 6> master;
+    Vector<V, 2> master;
     load_mean<Fields>(set_.at(i, kPoseField), pose);
     load_mean<Fields>(master_at(i, n), master);
     View<V> view;
@@ -649,7 +659,8 @@ class Slatf {
     Matrix<V, 2, 2> a;
     project(view.by_master, verdict.root, a);
     Matrix<V, 2, 2> noise = echoes.sonar.template R<V>();
-    const math::Mask<V> finite = potter<true>(a, noise, view.innovation, verdict.posterior);
+    const math::Mask<V> finite =
+        potter<!math::is_number<V>()>(a, noise, view.innovation, verdict.posterior);
     verdict.valid = finite && verdict.valid;
     if (params_.gate > Scalar(0)) saturate(V(gate()), verdict.posterior);
     return Proposal::kInformed ? V(0) : log_density(verdict.valid, verdict.posterior, noise);
@@ -660,7 +671,8 @@ class Slatf {
   void weigh_known(int i, int n, const Echoes& echoes, int s, Verdict<Value>* verdicts) const {
     using Fields = typename Group::Fields;
     foresee<Group, 1>(i);
-    Verdict<typename Fields::Value> verdict;
+    Verdict<typename Fields::Value> both;
+    Verdict<typename Fields::Value>& verdict = draft(both, verdicts);
     regress<Fields>(i, n, verdict);
     hand_out_regression(verdict, verdicts);
     const typename Fields::Value density = weigh<Fields>(i, n, echoes, s, verdict);
@@ -678,20 +690,17 @@ class Slatf {
     verdict.valid = verdict.valid && mine;
   }
 
-  // Each half as soon as it is known, for it takes no registers then.
+  // A verdict is written where it belongs; one of two groups is handed out, each half as soon as it
+  // is known, so that it takes no registers then.
   using Verdicts = Verdict<math::Twin<Value>>;
-  static AUVEST_INLINE void hand_out_regression(const Verdict<Value>& from, Verdict<Value>* to) {
-    to->root = from.root;
-    to->slope = from.slope;
-  }
+  static AUVEST_INLINE Verdict<Value>& draft(Verdict<Value>&, Verdict<Value>* to) { return *to; }
+  static AUVEST_INLINE Verdicts& draft(Verdicts& both, Verdict<Value>*) { return both; }
+  static AUVEST_INLINE void hand_out_regression(const Verdict<Value>&, Verdict<Value>*) {}
   static AUVEST_INLINE void hand_out_regression(const Verdicts& from, Verdict<Value>* to) {
     math::split(from.root, to[0].root, to[1].root);
     math::split(from.slope, to[0].slope, to[1].slope);
   }
-  static AUVEST_INLINE void hand_out_posterior(const Verdict<Value>& from, Verdict<Value>* to) {
-    to->posterior = from.posterior;
-    to->valid = from.valid;
-  }
+  static AUVEST_INLINE void hand_out_posterior(const Verdict<Value>&, Verdict<Value>*) {}
   static AUVEST_INLINE void hand_out_posterior(const Verdicts& from, Verdict<Value>* to) {
     math::split(from.posterior.y, to[0].posterior.y, to[1].posterior.y);
     math::split(from.posterior.g, to[0].posterior.g, to[1].posterior.g);
@@ -709,13 +718,10 @@ class Slatf {
     const math::Mask<Value> finite =
         move_belief(master, verdict.root, verdict.slope, verdict.posterior);
     const math::Mask<Value> moved = finite && verdict.valid;
-    if (all(moved)) {
-      store_master(i, n, master);
-      return;
-    }
     store_belief_where<Lanes>(moved, master_at(i, n), master);
+    if (Proposal::kInformed || all(moved)) return;
     const math::Mask<Value> lost = verdict.valid && !finite;  // weighs nothing
-    if (!Proposal::kInformed) multiply_weight(i, select(lost, Value(-1e20), Value(0)));
+    multiply_weight(i, select(lost, Value(-1e20), Value(0)));
   }
 
   /// The update of master n where it has several models: all at once, as their probabilities follow
@@ -749,7 +755,7 @@ class Slatf {
       Matrix<Value, 2, 2> noise = echoes.sonar.template R<Value>();
       Posterior<Value, 2> posterior;
       Echo<Value> echo;
-      echo.valid = potter<true>(a, noise, view.innovation, posterior);
+      echo.valid = potter<!math::is_number<Value>()>(a, noise, view.innovation, posterior);
       echo.valid = echo.valid && definite;
       if (slatf.params_.gate > Scalar(0)) saturate(Value(slatf.gate()), posterior);
       echo.valid = echo.valid && move_belief(master, root, slope, posterior);
