@@ -287,7 +287,8 @@ AUVEST_INLINE Value atan2(const Value& y, const Value& x) {
   const Value high = select(steep, Value(1.57079637f), select(left, Value(3.14159274f), zero));
   const Value low =
       select(steep, Value(-4.37113883e-08f), select(left, Value(-8.74227766e-08f), zero));
-  const Value z = select(steep ^ left, -ratio, ratio);
+  const Value rising = select(steep, -ratio, ratio);
+  const Value z = select(left, -rising, rising);
   const Value u = ratio * ratio;
   const Value bent = low + z * (u * detail::atan_polynomial(u));
   const Value tail = select(ratio >= Value(2.44140625e-04f), bent, low);  // 2^-12

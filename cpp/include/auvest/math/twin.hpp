@@ -25,9 +25,6 @@ struct TwinMask {
     return TwinMask(x.a || y.a, x.b || y.b);
   }
   AUVEST_INLINE TwinMask operator!() const { return TwinMask(!a, !b); }
-  friend AUVEST_INLINE TwinMask operator^(const TwinMask& x, const TwinMask& y) {
-    return TwinMask(x.a ^ y.a, x.b ^ y.b);
-  }
   friend AUVEST_INLINE bool any(const TwinMask& x) { return any(x.a) || any(x.b); }
   friend AUVEST_INLINE bool all(const TwinMask& x) { return all(x.a) && all(x.b); }
 };
