@@ -108,6 +108,7 @@ AUVEST_INLINE FloatBatch<Arch> larger(const FloatBatch<Arch>& a, const FloatBatc
   return FloatBatch<Arch>(xsimd::max(b.v, a.v));
 }
 
+/// `b` where b < a, `a` elsewhere; so `a` where one of them is NaN.
 template <class Arch>
 AUVEST_INLINE FloatBatch<Arch> smaller(const FloatBatch<Arch>& a, const FloatBatch<Arch>& b) {
   return FloatBatch<Arch>(xsimd::min(b.v, a.v));
@@ -145,6 +146,8 @@ template <class Arch>
 AUVEST_INLINE FloatBatch<Arch> sqrt(const FloatBatch<Arch>& x) {
   return FloatBatch<Arch>(xsimd::sqrt(x.v));
 }
+
+// From here on a Value is a FloatBatch or a Twin.
 
 namespace detail {
 
@@ -190,7 +193,6 @@ struct WordOf<Twin<Batch>> {
 
 }  // namespace detail
 
-// From here on a Value is a FloatBatch or a Twin.
 template <class Value>
 using WordOf = typename detail::WordOf<Value>::Type;
 

@@ -1,5 +1,6 @@
 // Two values side by side, each of which goes through the same operations: while one waits for a
-// root or a quotient the processor works on the other. Value: a number or a batch (simd.hpp).
+// root or a quotient the processor works on the other. Value: a batch (simd.hpp), whose functions
+// take a Twin as a batch of twice the width.
 #pragma once
 
 #include <cstdint>
