@@ -64,7 +64,7 @@ def command(
         typer.Option(
             min=0,
             max=60,
-            help="Rejections in a row after which the covariance is widened; 0: never.",
+            help="Rejections, none like another, after which the covariance is widened; 0: never.",
             rich_help_panel=FILTER,
         ),
     ] = RejectionStreak().rejections,
