@@ -10,6 +10,10 @@ if(CMAKE_SOURCE_DIR STREQUAL PROJECT_SOURCE_DIR)
   endif()
 endif()
 
+# The instruction sets of SIMD code that is chosen at run time.
+set(auvest_flags_avx2 -mavx2)
+set(auvest_flags_avx512 -mavx512f -mavx512dq -mavx512bw -mavx512vl -mfma -mtune=skylake-avx512)
+
 # auvest_own(target): the library, warnings as errors, sanitizers where AUVEST_SANITIZE is set.
 function(auvest_own target)
   target_link_libraries(${target} PRIVATE auvest::auvest)

@@ -5,7 +5,8 @@
 //             process parameters, sensor (leader left out), x0, P0,
 //             then per step: flags, dt, input, z, leader
 //     trace:  status of reset, then per step: x, P, innovation, S, nis, standardised, weight,
-//             variance asked for by the recovery, two words of counts and statuses
+//             variance asked for by the recovery and its two recent rejections, two words of counts
+//             and statuses
 #pragma once
 
 #include "any_kernel.hpp"
@@ -105,6 +106,9 @@ class RobustReplay {
     write(u.weight(0));
     const RejectionStreak<float>& streak = filter.rule().recovery.streak;
     write(streak.variance);
+    for (int i = 0; i < 2; ++i) {
+      for (int k = 0; k < 3; ++k) write(streak.recent(i, k));
+    }
     stream_.write(
         static_cast<std::uint32_t>(u.decision) | static_cast<std::uint32_t>(u.iterations) << 8 |
         static_cast<std::uint32_t>(predicted) << 16 | static_cast<std::uint32_t>(u.status) << 24);

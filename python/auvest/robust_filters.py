@@ -452,6 +452,8 @@ class RobustFilter:
                 )
         states = state_count(self._process)
         try:
+            if len(state["recovery"]) != 3:
+                raise ValueError("state['recovery'] must be the three that save() gave")
             count, variance, recent = state["recovery"]
             core = {
                 "x": as_array("state['x']", state["x"], (states,), self._dtype),

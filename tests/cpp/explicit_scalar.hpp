@@ -89,9 +89,6 @@ inline void sincos(ExplicitDouble x, ExplicitDouble& s, ExplicitDouble& c) {
   c = ExplicitDouble(cosine);
 }
 inline void sincos_near(ExplicitDouble x, ExplicitDouble& s, ExplicitDouble& c) { sincos(x, s, c); }
-inline void sincos_positive(ExplicitDouble x, ExplicitDouble& s, ExplicitDouble& c) {
-  sincos(x, s, c);
-}
 
 }  // namespace math
 }  // namespace auvest

@@ -42,6 +42,7 @@ def trace_type(states: int) -> np.dtype:
             ("standardised", "<u4"),
             ("weight", "<u4"),
             ("variance", "<u4"),
+            ("recent", "<u4", 6),
             ("decision", "u1"),
             ("iterations", "u1"),
             ("predict", "u1"),
@@ -118,8 +119,12 @@ class RobustRecord:
                     row["decision"], row["iterations"] = int(r.decision), r.iterations
                     row["recovered"] = r.recovered
             row["x"], row["P"] = bits(f.x), bits(f.P[lower])
-            count, variance, _ = f.save()["recovery"]
-            row["count"], row["variance"] = count, bits(variance)
+            count, variance, recent = f.save()["recovery"]
+            row["count"], row["variance"], row["recent"] = (
+                count,
+                bits(variance),
+                bits(recent).ravel(),
+            )
         return trace
 
     def _sensor(self, step: np.void) -> LeaderRange:

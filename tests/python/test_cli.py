@@ -325,7 +325,9 @@ def interrupt_after(seconds: float, command: list[str], cwd: Path) -> tuple[int,
         # A shell that runs the tests in the background has them ignore the signal.
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
+    deadline = time.monotonic() + 120
     while not output.exists() and program.poll() is None:  # made just before the work
+        assert time.monotonic() < deadline, "the work has not begun"
         time.sleep(0.1)
     time.sleep(seconds)
     program.send_signal(signal.SIGINT)

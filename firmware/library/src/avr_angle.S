@@ -15,7 +15,7 @@ two_pi: .byte   0xa2, 0xda, 0x0f, 0xc9, 0, 0, 0, 0, 0, 0, 0, 0
 
         .section .text.auvest_angle, "ax", @progbits
 
-; r25:r18 = (12 bytes at Z times r25:r22) modulo 2^96, without its last four bytes.
+; r25:r18 = (12 bytes at Z times r25:r22) modulo 2^96, without its four lowest bytes.
 multiply:
         push    r16
         push    r17

@@ -1,9 +1,10 @@
 #if defined(__AVR__) && defined(__AVR_HAVE_MUL__) && defined(__AVR_HAVE_JMP_CALL__)
 
-; Float arithmetic for AVR chips with a hardware multiplier: A + B, A - B, A * B, A / B and the root of
-; A, rounded as IEEE 754 says, to nearest and ties to even, with signed zeros, subnormal numbers,
-; infinities and NaN. The linker takes these routines in place of avr-libc's, which are larger and, but
-; for the root, slower, and which round subnormal quotients down. All share one beginning and one end.
+; Float arithmetic for AVR chips with a hardware multiplier: A + B, A - B, A * B, A / B and the root
+; of A, rounded as IEEE 754 says, to nearest and ties to even, with signed zeros, subnormal numbers,
+; infinities and NaN. The linker takes these routines in place of avr-libc's, which are larger and,
+; but for the root, slower, and which round subnormal quotients down. All share one end, and all but
+; the sum one beginning.
 ;
 ; Arguments and results as avr-gcc has them: A in r25:r22, B in r21:r18, result in r25:r22; r0,
 ; r18-r27, r30, r31 and T may change, r1 is zero.
@@ -382,8 +383,9 @@ divide_normal:
         rol     r19
         rol     r20
         rjmp    3b
-        ; The remainder is r21:r31:r30, at first A; r20:r18 = B - 1 is less if B is not more. Bits of the
-        ; quotient come in at r25, bytes at r22, until the first bit, which is 1, is at its place.
+        ; The remainder is r21:r31:r30, at first A; r20:r18 = B - 1 is less if B is not more. Bits
+        ; of the quotient come in at r25, bytes at r22, until the first bit, which is 1, is at its
+        ; place.
 4:      movw    r30, r22
         mov     r21, r24
         clr     r22

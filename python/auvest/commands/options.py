@@ -111,7 +111,7 @@ Precision = Annotated[
     ),
 ]
 
-# The noise of the AUKF paper's scenario.
+# The noise of the AUKF paper's scenario: `simulate aukf` and `capture`.
 Noise = Annotated[
     NoiseKind,
     typer.Option(

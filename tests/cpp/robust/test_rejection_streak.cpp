@@ -274,7 +274,7 @@ int false_recoveries(double outlier_sigma_m) {
 }
 
 TEST_CASE("lock-out: outliers are hardly ever taken for a wrong prior") {
-  // 33,120 ranges each. Rejections merely counted, 2 up and 1 down, would make 6 and 14.
+  // 33,120 ranges each.
   CHECK(false_recoveries(10) <= 3);
   CHECK(false_recoveries(30) <= 1);
 }

@@ -144,7 +144,7 @@ class GaussianFilter {
     if (!correction.near_field) {
       return derived().linearise(model, point, root, z, correction.innovation, a, noise);
     }
-    // A measurement of the observed states themselves, of the same number: A is their root.
+    // A measurement of the observed states themselves, as many numbers: A is their root.
     std::memcpy(a.data(), root.data(), sizeof a < sizeof root ? sizeof a : sizeof root);
     return Status::kOk;
   }

@@ -105,8 +105,8 @@ AUVEST_INLINE void innovation_covariance(const Matrix<Value, 1, 2>& a,
 ///
 /// With `Independent` E is diagonal: nothing to decorrelate. The first measurement meets y = 0 and
 /// G = I: batches leave out what these multiply. (Numbers do not: code costs flash.) Neither
-/// changes a bit: at most the signs of zeros in f, v and `surprise`, and what these are added to is
-/// not -0.
+/// changes a bit of a finite result: at most the signs of zeros in f, v and `surprise`, and what
+/// these are added to is not -0.
 template <bool Independent = false, class Value, int M, int O>
 AUVEST_OUTLINE AUVEST_INLINE math::Mask<Value> potter(Matrix<Value, M, O>& a,
                                                       Matrix<Value, M, M>& noise,
@@ -261,7 +261,7 @@ AUVEST_OUTLINE AUVEST_INLINE Status correct_belief(
   const Scalar f1 = a(0, 1);
   const Scalar x0 = belief.x(0) + root(0, 0) * f0 * step;
   const Scalar x1 = belief.x(1) + (root(1, 0) * f0 + root(1, 1) * f1) * step;
-  const bool finite = math::is_finite(spread) && math::is_finite(inverse) && math::is_finite(nis) &&
+  const bool finite = math::is_finite(spread) && math::is_positive(inverse) && math::is_finite(nis) &&
                       math::is_finite(x0) && math::is_finite(x1);
   if (!finite) return Status::kOverflow;
   correction.nis = nis;

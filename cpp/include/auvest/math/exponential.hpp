@@ -80,10 +80,10 @@ inline float log(float x) {
   return detail::log_kernel(m, static_cast<float>(power));
 }
 
-/// e^x where that is a normal number.
+/// e^x where that is a normal number: for batches, which need not look for other x.
 AUVEST_INLINE float exp_normal(float x) { return exp(x); }
 
-/// ln(x) for a positive normal number.
+/// ln(x) for a positive normal number: as above.
 AUVEST_INLINE float log_normal(float x) { return log(x); }
 
 namespace detail {

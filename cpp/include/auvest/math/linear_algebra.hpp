@@ -96,7 +96,7 @@ AUVEST_INLINE void set_zero(Matrix<Value, Rows, Cols>& a) {
 /// to = from. (Eigen's assignment is written out element by element, which takes flash.)
 template <class Scalar, int Rows, int Cols>
 inline void copy(const Matrix<Scalar, Rows, Cols>& from, Matrix<Scalar, Rows, Cols>& to) {
-  std::memcpy(to.data(), from.data(), sizeof(Scalar) * Rows * Cols);
+  std::memcpy(static_cast<void*>(&to), &from, sizeof to);
 }
 
 template <class Scalar, int N>

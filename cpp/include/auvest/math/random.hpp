@@ -41,7 +41,7 @@ AUVEST_INLINE void box_muller(const Value& u, const Value& v, Value& a, Value& b
   const Value angle_rad = two_pi<Value>() * v;
   const Value radius = sqrt(Value(-2) * log_normal(above_zero));
   Value sine, cosine;
-  sincos_positive(angle_rad, sine, cosine);
+  sincos_near(angle_rad, sine, cosine);
   a = radius * cosine;
   b = radius * sine;
 }

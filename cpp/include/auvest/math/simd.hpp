@@ -248,7 +248,7 @@ AUVEST_INLINE Value log(const Value& x) {
 }
 
 template <class Value, class = WordOf<Value>>
-AUVEST_INLINE void sincos_positive(const Value& x, Value& s, Value& c) {
+AUVEST_INLINE void sincos_near(const Value& x, Value& s, Value& c) {
   using Word = WordOf<Value>;
   // Up to pi/4, where the scalar code does not reduce, k is 0 and nothing is subtracted.
   Value shifted;
@@ -271,7 +271,7 @@ AUVEST_INLINE void sincos(const Value& x, Value& s, Value& c) {
     c = detail::lane_by_lane(x, [](float lane) { return math::cos(lane); });
     return;
   }
-  sincos_positive(x, s, c);
+  sincos_near(x, s, c);
   s = select(size < Value(2.44140625e-04f), x, s);  // 2^-12
 }
 

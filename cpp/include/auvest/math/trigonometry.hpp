@@ -338,9 +338,6 @@ inline void sincos(float x, float& s, float& c) {
   if (size < 0x39800000u) s = x;
 }
 
-/// s = sin(x), c = cos(x) for 0 <= x <= 96: for batches, which need not look for other x.
-AUVEST_INLINE void sincos_positive(float x, float& s, float& c) { sincos(x, s, c); }
-
 /// The angle of the point (x, y) in rad, in [-pi, pi], with C99's results for signed zeros and
 /// infinities. A NaN gives NaN.
 AUVEST_OUTLINE AUVEST_INLINE float atan2(float y, float x) {
@@ -366,8 +363,7 @@ AUVEST_OUTLINE AUVEST_INLINE float atan2(float y, float x) {
     if (!(small == large)) return quiet_nan();
     z = to_bits(small) != 0 ? 1.0f : 0.0f;  // two infinities or two zeros
   } else if (leading(to_bits(z)) < leading(0x0d800000u) && to_bits(small) != 0) {  // 2^-100
-    // Where the quotient would be subnormal not every target rounds it correctly; a product it
-    // does.
+    // Not every target rounds a subnormal quotient correctly.
     z = small / (large * 5.96046448e-08f) * 5.96046448e-08f;  // 2^-24
   }
   float tail = high * -2.78275338e-08f;  // what `high` lacks
@@ -384,7 +380,6 @@ inline void sincos(double x, double& s, double& c) {
   detail::DoubleTrigonometry<sizeof(double)>::sincos(x, s, c);
 }
 inline void sincos_near(double x, double& s, double& c) { sincos(x, s, c); }
-inline void sincos_positive(double x, double& s, double& c) { sincos(x, s, c); }
 AUVEST_INLINE double atan2(double y, double x) {
   return detail::DoubleTrigonometry<sizeof(double)>::atan2(y, x);
 }

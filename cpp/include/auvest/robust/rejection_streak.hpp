@@ -9,7 +9,7 @@
 // same amount until it moves, so that whoever looks along the same line sees the same innovation
 // again:
 //
-//     rejected, along a line not looked along lately         log 1 / p          =  2.0 nats    + 4
+//     rejected, along neither of the last two lines          log 1 / p          =  2.0 nats    + 4
 //     rejected, the same innovation along the same line      log 1 / (p q)      =  3.5 nats    + 7
 //     rejected, another innovation along the same line       log 1 / (1 - q)    =  0.2 nats    + 1
 //     accepted                                                                                 - 2
@@ -47,7 +47,7 @@ struct RejectionStreak {
   Params params;
   std::uint8_t count;           ///< 0..4 n
   Scalar variance;              ///< v as the rejections so far ask for it [m^2], 0 if count is
-  Matrix<Scalar, 2, 3> recent;  ///< h and innovation of the last two rejections, the newest first
+  Matrix<Scalar, 2, 3> recent;  ///< h and innovation of rejections along the last two lines
 
   explicit RejectionStreak(const Params& p = Params()) : params(p) { restart(); }
 
@@ -62,10 +62,13 @@ struct RejectionStreak {
   bool after(const RobustCorrection<Scalar, M>& correction, const Matrix<Scalar, M, O>& a,
              const Matrix<Scalar, O, O>& root, Belief<Scalar, N>& belief) {
     int evidence = 0;
+    int rejected = 0;
     for (int m = 0; m < M; ++m) {
       if (correction.weight(m) > Scalar(0)) continue;
-      const int more = weigh(&a(m, 0), root, correction.innovation(m), correction.S(m, m));
+      const int more =
+          weigh(&a(m, 0), root, correction.innovation(m), correction.S(m, m), rejected);
       if (more > evidence) evidence = more;
+      ++rejected;
     }
     if (evidence == 0) {
       count = static_cast<std::uint8_t>(count > kAccepted ? count - kAccepted : 0);
@@ -94,9 +97,12 @@ struct RejectionStreak {
   static constexpr int kContradicted = 1;
   static constexpr int kAccepted = 2;  // against it
 
-  /// What the rejection of a component says, and how far off it says the position is.
+  /// What the rejection of a component says, and how far off it says the position is. `before`:
+  /// components of the same measurement that were rejected before it; they cannot repeat each
+  /// other.
   template <int O>
-  int weigh(const Scalar* a, const Matrix<Scalar, O, O>& root, Scalar innovation, Scalar s) {
+  int weigh(const Scalar* a, const Matrix<Scalar, O, O>& root, Scalar innovation, Scalar s,
+            int before) {
     constexpr int kPosition = O < 2 ? O : 2;
     Vector<Scalar, O> h;  // h L = a
     for (int k = O - 1; k >= 0; --k) {
@@ -116,10 +122,10 @@ struct RejectionStreak {
     const Scalar alike2 = Scalar(9) * s + Scalar(0.015625) * square;
     int evidence = kRejected;
     int replaced = 1;
-    for (int i = 0; i < 2; ++i) {
-      Scalar apart[kPosition];
-      for (int k = 0; k < kPosition; ++k) apart[k] = h(k) - recent(i, k);
-      if (!(math::dot(apart, apart, kPosition) < near2)) continue;
+    const Scalar line[2] = {h(0), kPosition > 1 ? h(kPosition - 1) : Scalar(0)};
+    for (int i = before; i < 2; ++i) {
+      const Scalar apart[2] = {line[0] - recent(i, 0), line[1] - recent(i, 1)};
+      if (!(math::dot(apart, apart, 2) < near2)) continue;
       const Scalar change = innovation - recent(i, 2);
       if (change * change < alike2) {
         evidence = kRepeated;
@@ -131,7 +137,8 @@ struct RejectionStreak {
     if (replaced == 1) {
       for (int k = 0; k < 3; ++k) recent(1, k) = recent(0, k);
     }
-    for (int k = 0; k < kPosition; ++k) recent(0, k) = h(k);
+    recent(0, 0) = line[0];
+    recent(0, 1) = line[1];
     recent(0, 2) = innovation;
     return evidence;
   }

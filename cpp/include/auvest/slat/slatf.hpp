@@ -320,13 +320,13 @@ class Slatf {
     return Lanes::kPairs && i + Lanes::kWidth < end;
   }
 
-  /// Asks for a third of what the next tile holds in the place of group i; there, or in a pair, in
-  /// two. Spread over the kernels, so that the way to the cache is never full.
+  /// Asks for one third of the fields of the block that lies one tile ahead of group i, for a pair
+  /// of both blocks. Thirds, between the kernels, so that the way to the cache is never full.
   template <class Group, int Third>
   AUVEST_INLINE void foresee(int i) const {
     if (!Lanes::kPairs || set_.size() <= kNearParticles) return;
     for (int k = i; k < i + Group::kParticles; k += Lanes::kWidth) {
-      if (place_in_block(k) != 0) continue;
+      if (place_in_block(k) != 0 || k + kTile >= set_.size()) continue;
       constexpr int kFirst = Set::kFields * Third / 3;
       constexpr int kCount = Set::kFields * (Third + 1) / 3 - kFirst;
       const Scalar* at = set_.at(k + kTile, kFirst);
