@@ -261,8 +261,8 @@ AUVEST_OUTLINE AUVEST_INLINE Status correct_belief(
   const Scalar f1 = a(0, 1);
   const Scalar x0 = belief.x(0) + root(0, 0) * f0 * step;
   const Scalar x1 = belief.x(1) + (root(1, 0) * f0 + root(1, 1) * f1) * step;
-  const bool finite = math::is_finite(spread) && math::is_positive(inverse) && math::is_finite(nis) &&
-                      math::is_finite(x0) && math::is_finite(x1);
+  const bool finite = math::is_finite(spread) && math::is_positive(inverse) &&
+                      math::is_finite(nis) && math::is_finite(x0) && math::is_finite(x1);
   if (!finite) return Status::kOverflow;
   correction.nis = nis;
   belief.x(0) = x0;
