@@ -1,7 +1,6 @@
-#include "auvest/filters/ekf.hpp"
-#include "auvest/filters/ukf.hpp"
-#include "auvest/scenarios/cooperative.hpp"
-#include "robust_binder.hpp"
+#include "auvest/models/leader_range.hpp"
+#include "handles.hpp"
+#include "simulation/cooperative.hpp"
 
 namespace auvest {
 namespace bindings {
@@ -61,9 +60,13 @@ py::tuple fleet(double dt_s, py::ssize_t steps) {
 /// Monte Carlo: run r draws from the stream first_run + r of the seed, so the runs may be shared
 /// out to any number of threads. Every run starts from the prototype's belief, moved by `offset`,
 /// or from a draw of it. Rows after a run's end are NaN.
-template <class Filter, class Scalar = typename Filter::Scalar>
-py::dict cooperate_many(const Filter& prototype, const PlanarLeaderRange<Scalar>& sensor,
-                        const py::dict& values) {
+template <class Scalar>
+py::dict cooperate_many(const FilterHandle<Scalar>& handle,
+                        const SensorHandle<Scalar>& handle_of_sensor, const py::dict& values) {
+  using Filter = typename desk::FilterFor<Scalar, 2>::Robust;
+  require_idle(handle);
+  const Filter& prototype = filter_for<Scalar, 2>(handle).filter();
+  const auto& sensor = model_of<LeaderRange<Scalar, 2>>(handle_of_sensor);
   const CooperativeScenario scenario = to_scenario(values);
   const auto seed = values["seed"].cast<std::uint64_t>();
   const auto first_run = values["first_run"].cast<std::uint64_t>();
@@ -150,20 +153,13 @@ py::dict cooperate_many(const Filter& prototype, const PlanarLeaderRange<Scalar>
   return result;
 }
 
-template <template <class> class Plain, class Scalar>
-void bind_filter(py::module_& m) {
-  using Filter = typename RobustBinder<Plain<SpeedHeading<Scalar>>>::Filter;
-  m.def("cooperate", &cooperate_many<Filter>, py::arg("slave"), py::arg("sensor"),
-        py::arg("scenario"));
-}
-
 }  // namespace
 
 void bind_cooperative(py::module_& m) {
-  bind_filter<Ekf, float>(m);
-  bind_filter<Ekf, double>(m);
-  bind_filter<Ukf, float>(m);
-  bind_filter<Ukf, double>(m);
+  m.def("cooperate", &cooperate_many<float>, py::arg("slave"), py::arg("sensor"),
+        py::arg("scenario"));
+  m.def("cooperate", &cooperate_many<double>, py::arg("slave"), py::arg("sensor"),
+        py::arg("scenario"));
   m.def("cooperative_fleet", &fleet, py::arg("dt_s"), py::arg("steps"));
   m.def("cooperative_defaults", [] {
     const CooperativeScenario s;

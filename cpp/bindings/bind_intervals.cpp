@@ -1,6 +1,5 @@
-#include "any_interval.hpp"
+#include "auvest/runtime/any_interval.hpp"
 #include "binders.hpp"
-#include "params.hpp"
 
 namespace auvest {
 namespace bindings {

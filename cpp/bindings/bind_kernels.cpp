@@ -1,8 +1,7 @@
-#include "any_kernel.hpp"
 #include "auvest/robust/rejection_streak.hpp"
 #include "auvest/robust/robust_update.hpp"
+#include "auvest/runtime/any_kernel.hpp"
 #include "binders.hpp"
-#include "params.hpp"
 
 namespace auvest {
 namespace bindings {

@@ -1,14 +1,164 @@
 #include <pybind11/stl.h>
 
 #include <array>
+#include <cmath>
 
-#include "auvest/scenarios/tracking.hpp"
-#include "binders.hpp"
+#include "auvest/models/range_bearing.hpp"
+#include "handles.hpp"
+#include "simulation/tracking.hpp"
 
 namespace auvest {
 namespace bindings {
+namespace {
+
+/// A draw from N(x, P): six normal deviates, in pairs.
+template <class Adaptive>
+typename Adaptive::State deviate(typename Adaptive::State x, const typename Adaptive::Covariance& p,
+                                 math::Random& random) {
+  using Scalar = typename Adaptive::Scalar;
+  constexpr int kStates = Adaptive::kStates;
+  static_assert(kStates % 2 == 0, "deviates come in pairs");
+  typename Adaptive::Covariance root;
+  Matrix<Scalar, 1, kStates> no_others;
+  if (!math::factor_leading(p, root, no_others)) return x;  // reset refuses P and says why
+  typename Adaptive::State normal;
+  for (int i = 0; i < kStates; i += 2) {
+    double first = 0;
+    double second = 0;
+    random.normal_pair(first, second);
+    normal(i) = static_cast<Scalar>(first);
+    normal(i + 1) = static_cast<Scalar>(second);
+  }
+  for (int i = 0; i < kStates; ++i) {
+    for (int j = 0; j <= i; ++j) x(i) = x(i) + root(i, j) * normal(j);
+  }
+  return x;
+}
+
+/// Monte Carlo over the closed loop: run r draws from the stream first_run + r of the seed, so
+/// the runs may be shared out to any number of threads. Rows after a run's end are NaN.
+template <class Scalar>
+py::dict simulate(const FilterHandle<Scalar>& handle, const Array<Scalar>& x0,
+                  const Array<Scalar>& p0, const SensorHandle<Scalar>& handle_of_sensor,
+                  const py::dict& scenario) {
+  constexpr int kStates = 6;
+  constexpr int kSize = 2;
+  using Adaptive = typename desk::FilterFor<Scalar, kStates>::Adaptive;
+  require_idle(handle);
+  const Adaptive& prototype = filter_for<Scalar, kStates>(handle).filter();
+  const auto& sensor = model_of<RangeBearing<Scalar, kStates>>(handle_of_sensor);
+  const auto state = to_matrix<kStates, 1>(x0, "x0");
+  const auto covariance = to_matrix<kStates, kStates>(p0, "P0");
+  const Track truth = scenario["track"].cast<Track>();
+  const SensorNoise noise = scenario["noise"].cast<SensorNoise>();
+  const auto seed = scenario["seed"].cast<std::uint64_t>();
+  const auto first_run = scenario["first_run"].cast<std::uint64_t>();
+  const auto runs = scenario["runs"].cast<py::ssize_t>();
+  const auto steps = scenario["steps"].cast<py::ssize_t>();
+  const auto duration_s = scenario["duration_s"].cast<double>();
+  const auto random_start = scenario["random_start"].cast<bool>();
+  TrackingProbe probe;
+  probe.period_s = scenario["probe_period_s"].cast<double>();
+  probe.budget_m = scenario["budget_m"].cast<double>();
+
+  const std::vector<py::ssize_t> flat{runs, steps};
+  const std::vector<py::ssize_t> planar{runs, steps, 2};
+  py::array_t<double> time(flat), interval(flat), nis(flat), tau(flat), distance(flat);
+  py::array_t<double> truth_xy(planar), measured(planar);
+  py::array_t<double> x(std::vector<py::ssize_t>{runs, steps, kStates});
+  py::array_t<double> position_covariance(std::vector<py::ssize_t>{runs, steps, 2, 2});
+  py::array_t<double> probe_square(runs), probe_above(runs), probe_count(runs);
+  py::array_t<std::int64_t> samples(runs);
+  py::array_t<std::uint8_t> status(runs);
+  for (auto* array :
+       {&time, &interval, &nis, &tau, &distance, &truth_xy, &measured, &x, &position_covariance}) {
+    std::fill_n(array->mutable_data(), array->size(), std::nan(""));
+  }
+  double* time_out = time.mutable_data();
+  double* interval_out = interval.mutable_data();
+  double* nis_out = nis.mutable_data();
+  double* tau_out = tau.mutable_data();
+  double* distance_out = distance.mutable_data();
+  double* truth_out = truth_xy.mutable_data();
+  double* z_out = measured.mutable_data();
+  double* x_out = x.mutable_data();
+  double* p_out = position_covariance.mutable_data();
+  double* square_out = probe_square.mutable_data();
+  double* above_out = probe_above.mutable_data();
+  double* count_out = probe_count.mutable_data();
+  std::int64_t* samples_out = samples.mutable_data();
+  std::uint8_t* status_out = status.mutable_data();
+  {
+    py::gil_scoped_release release;
+    for (py::ssize_t run = 0; run < runs; ++run) {
+      Adaptive filter = prototype;
+      math::Random random(seed, first_run + static_cast<std::uint64_t>(run));
+      TrackingProbe seen = probe;
+      py::ssize_t row = run * steps;
+      typename Adaptive::Position start;
+      start(0) = static_cast<Scalar>(truth.position[0]);
+      start(1) = static_cast<Scalar>(truth.position[1]);
+      Status result = filter.reset(
+          random_start ? deviate<Adaptive>(state, covariance, random) : state, covariance, start);
+      if (result == Status::kOk) {
+        result = track(filter, sensor, truth, noise, random, static_cast<std::uint32_t>(steps),
+                       duration_s, seen, [&](const TrackingStep<Adaptive, kSize>& step) {
+                         time_out[row] = step.time_s;
+                         interval_out[row] = static_cast<double>(step.filter.interval());
+                         nis_out[row] = static_cast<double>(step.correction.nis);
+                         const auto& law = step.filter.policy().mahalanobis.memory;
+                         tau_out[row] = static_cast<double>(law.tau);
+                         distance_out[row] = static_cast<double>(law.mahalanobis_squared);
+                         const auto p = step.filter.P();
+                         for (int i = 0; i < 2; ++i) {
+                           truth_out[row * 2 + i] = step.truth.position[i];
+                           z_out[row * 2 + i] = step.z[i];
+                           for (int j = 0; j < 2; ++j) {
+                             p_out[row * 4 + i * 2 + j] = static_cast<double>(p(i, j));
+                           }
+                         }
+                         for (int i = 0; i < kStates; ++i) {
+                           x_out[row * kStates + i] = static_cast<double>(step.filter.x()(i));
+                         }
+                         ++row;
+                       });
+      }
+      samples_out[run] = row - run * steps;
+      status_out[run] = static_cast<std::uint8_t>(result);
+      square_out[run] = seen.square_sum;
+      above_out[run] = seen.above;
+      count_out[run] = seen.count;
+    }
+  }
+  py::dict result;
+  result["time_s"] = time;
+  result["interval_s"] = interval;
+  result["truth"] = truth_xy;
+  result["z"] = measured;
+  result["x"] = x;
+  result["position_covariance"] = position_covariance;
+  result["nis"] = nis;
+  result["tau"] = tau;
+  result["mahalanobis_squared"] = distance;
+  result["samples"] = samples;
+  result["status"] = status;
+  result["probe_square_sum"] = probe_square;
+  result["probe_above"] = probe_above;
+  result["probe_count"] = probe_count;
+  return result;
+}
+
+template <class Scalar>
+void bind_simulation(py::module_& m) {
+  m.def("simulate_tracking", &simulate<Scalar>, py::arg("filter"), py::arg("x0").noconvert(),
+        py::arg("P0").noconvert(), py::arg("sensor"), py::arg("scenario"));
+}
+
+}  // namespace
 
 void bind_tracking(py::module_& m) {
+  bind_simulation<float>(m);
+  bind_simulation<double>(m);
   using Vector2 = std::array<double, 2>;
   py::class_<Track>(m, "Track", "The true and desired track of the tracking scenario.")
       .def(py::init([](const std::string& kind, const Vector2& position, const Vector2& velocity,

@@ -13,6 +13,13 @@
 #include "auvest/types.hpp"
 
 namespace auvest {
+
+/// Params that name their own members.
+template <class Params, class Visitor>
+auto visit(Params& params, Visitor&& visitor) -> decltype(params.visit(visitor)) {
+  params.visit(visitor);
+}
+
 namespace bindings {
 
 namespace py = pybind11;
@@ -20,17 +27,9 @@ namespace py = pybind11;
 void bind_status(py::module_& m);
 void bind_math(py::module_& m);
 void bind_random(py::module_& m);
-void bind_range_bearing(py::module_& m);
-void bind_dead_reckoning(py::module_& m);
 void bind_kernels(py::module_& m);
-void bind_leader_range(py::module_& m);
-void bind_robust_ekf(py::module_& m);
-void bind_robust_ukf(py::module_& m);
 void bind_intervals(py::module_& m);
-void bind_constant_acceleration(py::module_& m);
-void bind_sigma_points(py::module_& m);
-void bind_ekf(py::module_& m);
-void bind_ukf(py::module_& m);
+void bind_filters(py::module_& m);
 void bind_cooperative(py::module_& m);
 void bind_tracking(py::module_& m);
 void bind_slat(py::module_& m);
@@ -107,7 +106,7 @@ inline void require_ok(Status status) {
   if (status != Status::kOk) throw StatusError(status);
 }
 
-/// Params struct <-> dict, through a `visit(params, visitor)` overload that names each member.
+/// Params struct <-> dict, through visit(params, visitor), which names each member.
 template <class Params>
 py::dict to_dict(const Params& params) {
   py::dict result;

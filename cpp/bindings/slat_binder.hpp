@@ -9,10 +9,9 @@
 #include <vector>
 
 #include "any_slat.hpp"
-#include "auvest/scenarios/slat.hpp"
 #include "auvest/slat/outage.hpp"
 #include "binders.hpp"
-#include "params.hpp"
+#include "simulation/slat.hpp"
 #include "slat_params.hpp"
 #include "slatf_setup.hpp"
 

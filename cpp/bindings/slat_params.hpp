@@ -7,10 +7,10 @@
 #include "auvest/models/piecewise_acceleration.hpp"
 #include "auvest/models/slave_motion.hpp"
 #include "auvest/models/sonar.hpp"
-#include "auvest/scenarios/slat.hpp"
 #include "auvest/slat/ekf_slat.hpp"
 #include "auvest/slat/slatf.hpp"
 #include "auvest/slat/slatf_joint.hpp"
+#include "simulation/slat.hpp"
 
 namespace auvest {
 

@@ -4,12 +4,12 @@
 
 #include <memory>
 
-#include "any_resampling.hpp"
 #include "any_slat.hpp"
 #include "auvest/models/constant_velocity.hpp"
 #include "auvest/models/coordinated_turn.hpp"
 #include "auvest/models/piecewise_acceleration.hpp"
 #include "auvest/models/slave_motion.hpp"
+#include "auvest/runtime/any_resampling.hpp"
 #include "auvest/slat/imm_slat.hpp"
 #include "auvest/slat/slatf.hpp"
 #include "auvest/slat/slatf_joint.hpp"

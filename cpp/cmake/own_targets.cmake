@@ -17,6 +17,8 @@ set(auvest_flags_avx512 -mavx512f -mavx512dq -mavx512bw -mavx512vl -mfma -mtune=
 # auvest_own(target): the library, warnings as errors, sanitizers where AUVEST_SANITIZE is set.
 function(auvest_own target)
   target_link_libraries(${target} PRIVATE auvest::auvest)
+  # simulation/ and desk/: headers that never ship to a chip.
+  target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR}/cpp)
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wconversion -Wshadow -Wdouble-promotion
                                            -Werror)
   if(AUVEST_SANITIZE)

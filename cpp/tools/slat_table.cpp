@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "auvest/auvest.hpp"
-#include "auvest/scenarios/slat.hpp"
+#include "simulation/slat.hpp"
 
 namespace {
 

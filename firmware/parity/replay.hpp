@@ -12,14 +12,13 @@
 // of kind kRobust goes on as replay_robust.hpp says.
 #pragma once
 
-#include "any_interval.hpp"
+#include "auvest/runtime/any_interval.hpp"
 #include "auvest/filters/adaptive_interval.hpp"
 #include "auvest/filters/ekf.hpp"
 #include "auvest/filters/ukf.hpp"
 #include "auvest/models/constant_acceleration.hpp"
 #include "auvest/models/range_bearing.hpp"
 #include "auvest/self_test.hpp"
-#include "params.hpp"
 #include "replay_robust.hpp"
 
 namespace auvest {
@@ -130,7 +129,7 @@ class Replay {
   /// The members in the order in which Python names them.
   template <class Params>
   void read_params(Params& params) {
-    visit(params, [this](const char*, float& value) { value = read(); });
+    params.visit([this](const char*, float& value) { value = read(); });
   }
 
   float read() { return math::from_bits(stream_.read()); }

@@ -9,14 +9,13 @@
 //             and statuses
 #pragma once
 
-#include "any_kernel.hpp"
-#include "any_recovery.hpp"
+#include "auvest/runtime/any_kernel.hpp"
+#include "auvest/runtime/any_recovery.hpp"
 #include "auvest/filters/ekf.hpp"
 #include "auvest/filters/robust.hpp"
 #include "auvest/models/leader_range.hpp"
 #include "auvest/models/odometry.hpp"
 #include "auvest/models/speed_heading.hpp"
-#include "params.hpp"
 
 namespace auvest {
 namespace parity {
@@ -64,7 +63,7 @@ class RobustReplay {
   void replay() {
     using Filter = Robust<Ekf<Process>, Rule>;
     typename Process::Params params;
-    visit(params, [this](const char*, float& value) { value = read(); });
+    params.visit([this](const char*, float& value) { value = read(); });
     LeaderRange<float, Process::kStates> sensor;
     sensor.params.sigma_range_m = read();
     sensor.params.sigma_leader_m = read();

@@ -1,6 +1,6 @@
 """Records of SLATF: what happens in the paper's scenario, and a filter that meets it.
 
-The world is that of ``auvest/scenarios/slat.hpp`` (configuration R1), computed in C++. Records and
+The world is that of ``simulation/slat.hpp`` (configuration R1), computed in C++. Records and
 traces are little-endian 32-bit words (see ``slatf_replay.hpp``).
 """
 

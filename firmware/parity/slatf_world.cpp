@@ -1,4 +1,4 @@
-// Writes what a slave meets in the scenario of the SLATF paper (auvest/scenarios/slat.hpp, R1),
+// Writes what a slave meets in the scenario of the SLATF paper (simulation/slat.hpp, R1),
 // computed in double and rounded to float once: its state and what it was told of the master when
 // communication broke, then every reading and echo. firmware/parity/slatf.py reads it.
 //
@@ -7,7 +7,7 @@
 #include <cstdlib>
 
 #include "auvest/math/bits.hpp"
-#include "auvest/scenarios/slat.hpp"
+#include "simulation/slat.hpp"
 
 namespace {
 

@@ -14,7 +14,7 @@ from typing import Literal
 
 ROOT = Path(__file__).resolve().parents[2]
 HERE = ROOT / "firmware/parity"
-INCLUDES = (f"-I{ROOT / 'cpp/include'}", "-I/usr/include/eigen3")
+INCLUDES = (f"-I{ROOT / 'cpp/include'}", f"-I{ROOT / 'cpp'}", "-I/usr/include/eigen3")
 
 _WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wdouble-promotion", "-Werror")
 _EIGEN = ("-DEIGEN_NO_IO", "-DEIGEN_NO_MALLOC", "-DEIGEN_DONT_VECTORIZE")
@@ -82,7 +82,7 @@ class Target:
             If the compiler is missing or fails.
         """
         require(self.compiler)
-        own = [f"-I{ROOT / 'cpp/bindings'}", f'-DAUVEST_REPLAY="{self.header}"']
+        own = [f'-DAUVEST_REPLAY="{self.header}"']
         if self.machine == "avr":
             own += [f"-I{ROOT / 'firmware/board'}", f"-I{ROOT / 'firmware/avr_std'}"]
         # Before the library's own path: what is in `extra` is found first.

@@ -318,7 +318,7 @@ class RobustUkf_EulerAcceleration_float64(_RobustFilter[_F64]): ...
 class RobustUkf_ExactAcceleration_float32(_RobustFilter[_F32]): ...
 class RobustUkf_ExactAcceleration_float64(_RobustFilter[_F64]): ...
 
-# scenarios/tracking.hpp
+# simulation/tracking.hpp
 
 class _TrackDict(TypedDict):
     position: _Pair
@@ -516,7 +516,7 @@ class SlatScenario(metaclass=_Type):
 
 def slat_scenario_defaults() -> _SlatScenarioDict: ...
 
-# scenarios/cooperative.hpp
+# simulation/cooperative.hpp
 
 class _CooperativeDict(TypedDict):
     sigma_m: float

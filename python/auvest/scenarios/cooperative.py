@@ -2,7 +2,7 @@
 
 Li, Du, Fan, Chen, Mao, Luo 2020. The paper gives neither tracks nor noise; the tracks are those of
 this project's own reference case. The loop is C++
-(``cpp/include/auvest/scenarios/cooperative.hpp``).
+(``cpp/simulation/cooperative.hpp``).
 """
 
 from __future__ import annotations

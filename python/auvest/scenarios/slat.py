@@ -1,6 +1,6 @@
 """The scenario of the SLATF paper, section 7: communication fails, a slave pings its master.
 
-The loop is C++ (``cpp/include/auvest/scenarios/slat.hpp``). The defaults are configuration R1 of
+The loop is C++ (``cpp/simulation/slat.hpp``). The defaults are configuration R1 of
 docs/algorithms/slatf.md, which fixes what the paper leaves open.
 """
 

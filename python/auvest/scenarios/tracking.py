@@ -1,6 +1,6 @@
 """A base station tracks an AUV by range and bearing: the simulation of the AUKF paper, section 3.
 
-The loop is C++ (``cpp/include/auvest/scenarios/tracking.hpp``): the filter's own interval decides
+The loop is C++ (``cpp/simulation/tracking.hpp``): the filter's own interval decides
 when the next sample is taken, and the desired track is the true one, as in the paper.
 """
 

@@ -127,7 +127,7 @@ template <class Model>
 void check_position_variance(const Model& model, const Belief<double, 6>& before) {
   Belief<double, 6> after = before;
   model.propagate(after, 0.7);
-  CHECK(model.position_variance(before.P, 0.7) == close_to(after.P(0, 0) + after.P(1, 1), 1e-14));
+  CHECK(model.position_variance(before, 0.7) == close_to(after.P(0, 0) + after.P(1, 1), 1e-14));
 }
 
 /// A filter fed with noise-free measurements of a standing target must end on it.

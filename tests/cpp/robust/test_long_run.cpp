@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "auvest/auvest.hpp"
-#include "auvest/scenarios/cooperative.hpp"
+#include "simulation/cooperative.hpp"
 
 namespace {
 

@@ -8,7 +8,7 @@
 #include <initializer_list>
 
 #include "auvest/auvest.hpp"
-#include "auvest/scenarios/cooperative.hpp"
+#include "simulation/cooperative.hpp"
 
 namespace {
 

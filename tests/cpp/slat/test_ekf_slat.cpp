@@ -11,7 +11,7 @@
 #include "auvest/models/piecewise_acceleration.hpp"
 #include "auvest/models/range_bearing.hpp"
 #include "auvest/models/slave_motion.hpp"
-#include "auvest/scenarios/slat.hpp"
+#include "simulation/slat.hpp"
 #include "auvest/slat/dead_reckoning.hpp"
 #include "auvest/slat/ekf_slat.hpp"
 #include "auvest/slat/outage.hpp"

@@ -11,7 +11,7 @@
 #include "auvest/models/constant_velocity.hpp"
 #include "auvest/models/coordinated_turn.hpp"
 #include "auvest/models/slave_motion.hpp"
-#include "auvest/scenarios/slat.hpp"
+#include "simulation/slat.hpp"
 #include "auvest/slat/imm_slat.hpp"
 #include "auvest/slat/slatf.hpp"
 

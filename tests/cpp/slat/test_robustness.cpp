@@ -8,7 +8,7 @@
 #include <cmath>
 #include <limits>
 
-#include "auvest/scenarios/slat.hpp"
+#include "simulation/slat.hpp"
 
 namespace {
 

@@ -6,6 +6,20 @@
 
 namespace auvest {
 
+/// The first-order expansion of h at the mean, with the second-order term of a model that has one,
+/// as GaussianFilter asks for it.
+template <class Model, class Point, class Scalar>
+AUVEST_INLINE void linearise_by_jacobian(
+    const Model& model, const Point& point,
+    const Matrix<Scalar, Model::kObserved, Model::kObserved>& root,
+    const typename Model::Measurement& z, typename Model::Measurement& innovation,
+    Matrix<Scalar, Model::kSize, Model::kObserved>& a, typename Model::Noise& noise) {
+  innovation = model.residual(z, point.value());
+  project(point.H(), root, a);
+  noise = model.R();
+  model.second_order(point, root, innovation, noise);
+}
+
 template <class Process>
 class Ekf : public GaussianFilter<Ekf<Process>, Process> {
  public:
@@ -28,10 +42,7 @@ class Ekf : public GaussianFilter<Ekf<Process>, Process> {
                    const typename Model::Measurement& z, typename Model::Measurement& innovation,
                    Matrix<Scalar, Model::kSize, Model::kObserved>& a,
                    typename Model::Noise& noise) const {
-    innovation = model.residual(z, point.value());
-    project(point.H(), root, a);
-    noise = model.R();
-    model.second_order(point, root, innovation, noise);
+    linearise_by_jacobian(model, point, root, z, innovation, a, noise);
     return Status::kOk;
   }
 };

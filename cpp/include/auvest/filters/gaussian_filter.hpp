@@ -82,6 +82,12 @@ class GaussianFilter {
     return status;
   }
 
+  /// What has driven the process since; interval policies ask for it.
+  template <class Input>
+  void drive(const Input& input) {
+    process_.input = input;
+  }
+
   /// Corrects the belief by the measurement z of a sensor described by `model`.
   template <class Model>
   AUVEST_OUTLINE Correction<Scalar, Model::kSize> update(const typename Model::Measurement& z,

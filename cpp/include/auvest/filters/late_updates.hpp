@@ -2,9 +2,11 @@
 //
 // The last events (predictions and updates) are kept, and the filter as it was before them. A late
 // measurement goes in where it belongs and all that is kept is done again: the filter is then, to
-// the bit, what it would be had the measurement come in time. The memory is bounded by `Capacity`
-// events; what is older than they are is refused with kTimeBackwards. Each event is done twice, now
-// and when it leaves the memory, and those in it once more per late measurement.
+// the bit, what it would be had the measurement come in time. The memory is bounded; what is older
+// than it is refused with kTimeBackwards. Each event is done twice, now and when it leaves the
+// memory, and those in it once more per late measurement.
+//
+// LateMemory works beside a filter, LateUpdates holds one and remembers `Capacity` events.
 #pragma once
 
 #include "auvest/filters/gaussian_filter.hpp"
@@ -12,9 +14,65 @@
 
 namespace auvest {
 
-template <class Filter, class Sensor, int Capacity>
-class LateUpdates {
+/// A prediction or an update, as it can be done again.
+template <class Filter, class Sensor>
+struct LateEvent {
+  using Scalar = typename Filter::Scalar;
+  using Input = typename Filter::Process::Input;
+  using Measurement = typename Sensor::Measurement;
+
+  bool is_update;
+  Scalar dt;      ///< of a prediction [s]
+  Input input;    ///< of a prediction
+  Measurement z;  ///< of an update, as the sensor
+  Sensor sensor;
+
+  LateEvent() : is_update(false), dt(Scalar(0)) {}
+  LateEvent(Scalar step, const Input& u) : is_update(false), dt(step), input(u) {
+    math::set_zero(z);
+  }
+  LateEvent(const Measurement& value, const Sensor& model)
+      : is_update(true), dt(Scalar(0)), z(value), sensor(model) {
+    math::set_zero(input);
+  }
+
+  Status redo(Filter& filter) const {
+    return is_update ? filter.update(z, sensor).status : filter.predict(dt, input);
+  }
+};
+
+/// The last `Capacity` events in order, in place.
+template <class Event, int Capacity>
+class EventArray {
   static_assert(Capacity >= 2, "a prediction and an update");
+
+ public:
+  EventArray() : count_(0) {}
+
+  int size() const { return count_; }
+  const Event& operator[](int k) const { return events_[k]; }
+  /// True where the first event must leave before another comes.
+  bool full() const { return count_ == Capacity; }
+
+  void insert(int at, const Event& event) {
+    for (int k = count_; k > at; --k) events_[k] = events_[k - 1];
+    events_[at] = event;
+    ++count_;
+  }
+
+  void remove_first() {
+    for (int k = 1; k < count_; ++k) events_[k - 1] = events_[k];
+    --count_;
+  }
+
+ private:
+  Event events_[Capacity];
+  int count_;
+};
+
+/// The events since some time ago, and the filter as it was then.
+template <class Filter, class Sensor, class Events_>
+class LateMemory {
   // Never defined: avr-gcc has no std::declval.
   static Filter& any_filter();
   static const typename Sensor::Measurement& any_measurement();
@@ -22,29 +80,33 @@ class LateUpdates {
 
  public:
   using Scalar = typename Filter::Scalar;
-  using Input = typename Filter::Process::Input;
-  using Measurement = typename Sensor::Measurement;
+  using Event = LateEvent<Filter, Sensor>;
+  using Events = Events_;
+  using Input = typename Event::Input;
+  using Measurement = typename Event::Measurement;
   using Report = decltype(any_filter().update(any_measurement(), any_sensor()));
 
   /// Goes on from where `filter` is.
-  explicit LateUpdates(const Filter& filter) : filter_(filter), base_(filter), count_(0) {}
+  explicit LateMemory(const Filter& filter, const Events& events = Events())
+      : base_(filter), events_(events) {}
 
   /// Carries the filter dt >= 0 seconds forward with this input.
-  Status predict(Scalar dt, const Input& input) {
-    const Status status = filter_.predict(dt, input);
-    if (status == Status::kOk) insert(count_, Event(dt, input));
+  Status predict(Filter& filter, Scalar dt, const Input& input) {
+    const Status status = filter.predict(dt, input);
+    if (status == Status::kOk) insert(events_.size(), Event(dt, input));
     return status;
   }
 
   /// Corrects by what was measured `age` >= 0 seconds ago: at the end of the prediction that ended
   /// nearest to then. Reports what the update did there. On anything but kOk nothing has changed.
-  Report update(const Measurement& z, const Sensor& sensor, Scalar age = Scalar(0)) {
+  Report update(Filter& filter, const Measurement& z, const Sensor& sensor, Scalar age) {
     if (!math::is_finite(age) || age < Scalar(0)) {
       return Report(math::is_finite(age) ? Status::kTimeBackwards : Status::kNotFinite);
     }
-    int at = count_;
+    const int count = events_.size();
+    int at = count;
     Scalar half = Scalar(0);  // of the first prediction that is kept
-    for (int k = count_ - 1; k >= 0; --k) {
+    for (int k = count - 1; k >= 0; --k) {
       if (events_[k].is_update) continue;
       half = Scalar(0.5) * events_[k].dt;
       if (!(age > half)) break;
@@ -53,65 +115,71 @@ class LateUpdates {
     }
     if (age > half) return Report(Status::kTimeBackwards);
 
-    if (at == count_) {
-      const Report report = filter_.update(z, sensor);
-      if (report.status == Status::kOk) insert(count_, Event(z, sensor));
+    if (at == count) {
+      const Report report = filter.update(z, sensor);
+      if (report.status == Status::kOk) insert(count, Event(z, sensor));
       return report;
     }
     Filter again = base_;
-    for (int k = 0; k < at; ++k) redo(events_[k], again);
+    for (int k = 0; k < at; ++k) events_[k].redo(again);
     const Report report = again.update(z, sensor);
     if (report.status != Status::kOk) return report;
-    for (int k = at; k < count_; ++k) {
-      const Status status = redo(events_[k], again);
+    for (int k = at; k < count; ++k) {
+      const Status status = events_[k].redo(again);
       if (status != Status::kOk) return Report(status);
     }
-    filter_ = again;
+    filter = again;
     insert(at, Event(z, sensor));
     return report;
+  }
+
+  const Filter& base() const { return base_; }  ///< before the first event
+  const Events& events() const { return events_; }
+
+ private:
+  /// Puts the event at place `at`; the first ones leave where there is no room.
+  void insert(int at, const Event& event) {
+    while (events_.full()) {
+      if (at == 0) {  // older than all that is kept: it leaves at once
+        event.redo(base_);
+        return;
+      }
+      events_[0].redo(base_);
+      events_.remove_first();
+      --at;
+    }
+    events_.insert(at, event);
+  }
+
+  Filter base_;
+  Events events_;
+};
+
+template <class Filter, class Sensor, int Capacity>
+class LateUpdates {
+ public:
+  using Memory = LateMemory<Filter, Sensor, EventArray<LateEvent<Filter, Sensor>, Capacity>>;
+  using Scalar = typename Filter::Scalar;
+  using Input = typename Memory::Input;
+  using Measurement = typename Memory::Measurement;
+  using Report = typename Memory::Report;
+
+  /// Goes on from where `filter` is.
+  explicit LateUpdates(const Filter& filter) : filter_(filter), memory_(filter) {}
+
+  /// Carries the filter dt >= 0 seconds forward with this input.
+  Status predict(Scalar dt, const Input& input) { return memory_.predict(filter_, dt, input); }
+
+  /// Corrects by what was measured `age` >= 0 seconds ago. On anything but kOk nothing has changed.
+  Report update(const Measurement& z, const Sensor& sensor, Scalar age = Scalar(0)) {
+    return memory_.update(filter_, z, sensor, age);
   }
 
   const Filter& filter() const { return filter_; }
 
  private:
-  struct Event {
-    bool is_update;
-    Scalar dt;      // of a prediction
-    Input input;    // of a prediction
-    Measurement z;  // of an update, as the sensor
-    Sensor sensor;
-
-    Event() : is_update(false), dt(Scalar(0)) {}
-    Event(Scalar step, const Input& u) : is_update(false), dt(step), input(u) { math::set_zero(z); }
-    Event(const Measurement& value, const Sensor& model)
-        : is_update(true), dt(Scalar(0)), z(value), sensor(model) {
-      math::set_zero(input);
-    }
-  };
-
-  static Status redo(const Event& event, Filter& filter) {
-    return event.is_update ? filter.update(event.z, event.sensor).status
-                           : filter.predict(event.dt, event.input);
-  }
-
-  /// Puts the event at place `at`; the first one leaves where there is no room.
-  void insert(int at, const Event& event) {
-    if (count_ == Capacity) {
-      redo(at > 0 ? events_[0] : event, base_);
-      if (at == 0) return;
-      for (int k = 1; k < at; ++k) events_[k - 1] = events_[k];
-      events_[at - 1] = event;
-      return;
-    }
-    for (int k = count_; k > at; --k) events_[k] = events_[k - 1];
-    events_[at] = event;
-    ++count_;
-  }
-
   Filter filter_;
-  Filter base_;  ///< before the first event
-  Event events_[Capacity];
-  int count_;
+  Memory memory_;
 };
 
 }  // namespace auvest

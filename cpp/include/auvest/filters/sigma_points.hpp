@@ -24,6 +24,14 @@ struct SigmaPoints {
     Scalar alpha = Scalar(1);   ///< spread of the points, 1e-8..1; Table 1: 1e-6
     Scalar beta = Scalar(2);    ///< prior knowledge, >= alpha^2; 2 is best for a Gaussian; Table 1
     Scalar kappa = Scalar(-3);  ///< secondary scaling, n + kappa > 0; Table 1, where n = 6
+
+    /// Names every member, in the order of stored records.
+    template <class Visitor>
+    void visit(Visitor&& v) {
+      v("alpha", alpha);
+      v("beta", beta);
+      v("kappa", kappa);
+    }
   };
 
   Scalar sqrt_c;       ///< sigma points lie at x +- sqrt_c L_i

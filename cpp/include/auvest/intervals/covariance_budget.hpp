@@ -18,6 +18,15 @@ struct CovarianceBudget {
 
   struct Params : IntervalLimits<Scalar> {
     Scalar position_sigma_m = Scalar(0.1);  ///< budget for sqrt(P_xx + P_yy) before an update
+
+    /// Names every member, in the order of stored records.
+    template <class Visitor>
+    void visit(Visitor&& v) {
+      v("initial_s", this->initial_s);
+      v("min_s", this->min_s);
+      v("max_s", this->max_s);
+      v("position_sigma_m", position_sigma_m);
+    }
   };
 
   Params params;
@@ -55,7 +64,7 @@ struct CovarianceBudget {
  private:
   template <class Filter>
   static Scalar variance(const Filter& filter, Scalar dt) {
-    return filter.process().position_variance(filter.belief().P, dt);
+    return filter.process().position_variance(filter.belief(), dt);
   }
 };
 

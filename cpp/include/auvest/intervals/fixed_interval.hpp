@@ -24,6 +24,12 @@ struct FixedInterval {
 
   struct Params {
     Scalar interval_s = Scalar(0.5);  ///< T > 0, Table 1
+
+    /// Names every member, in the order of stored records.
+    template <class Visitor>
+    void visit(Visitor&& v) {
+      v("interval_s", interval_s);
+    }
   };
 
   Params params;

@@ -29,6 +29,22 @@ struct MahalanobisInterval {
     Scalar tau_min = Scalar(0.01);    ///< the text says tau in (0, 1): clamped to
     Scalar tau_max = Scalar(0.99);    ///< [tau_min, tau_max]
 
+    /// Names every member, in the order of stored records.
+    template <class Visitor>
+    void visit(Visitor&& v) {
+      v("initial_s", this->initial_s);
+      v("min_s", this->min_s);
+      v("max_s", this->max_s);
+      v("tau0", tau0);
+      v("scale", scale);
+      v("epsilon", epsilon);
+      v("gamma1_m2", gamma1_m2);
+      v("gamma2", gamma2);
+      v("ratio_max", ratio_max);
+      v("tau_min", tau_min);
+      v("tau_max", tau_max);
+    }
+
     /// gamma1 and gamma2 with which the law does what the paper's Fig. 3 shows.
     static Params figure3() { return Params(); }
 

@@ -22,6 +22,14 @@ struct AccelerationNoise {
   Scalar position = Scalar(1e-6);      ///< q_p [m^2/s]
   Scalar velocity = Scalar(1e-4);      ///< q_v [m^2/s^3]
   Scalar acceleration = Scalar(1e-5);  ///< q_a [m^2/s^5]: white jerk
+
+  /// Names every member, in the order of stored records.
+  template <class Visitor>
+  void visit(Visitor&& v) {
+    v("position_psd", position);
+    v("velocity_psd", velocity);
+    v("acceleration_psd", acceleration);
+  }
 };
 
 template <class Scalar_, int Order>
@@ -90,7 +98,8 @@ struct ConstantAcceleration : ProcessModel<ConstantAcceleration<Scalar_, Order>,
   }
 
   /// P_xx + P_yy after dt seconds, without forming the rest of P.
-  Scalar position_variance(const Covariance& p, Scalar dt) const {
+  Scalar position_variance(const Belief<Scalar, 6>& belief, Scalar dt) const {
+    const Covariance& p = belief.P;
     const Coefficients c(dt);
     Scalar sum = Scalar(0);
     for (int i = 0; i < 2; ++i) {

@@ -27,6 +27,15 @@ struct LeaderRangeParams {
   Scalar leader_y_m = Scalar(0);
   Scalar sigma_range_m = Scalar(1);   ///< s_e, Eq. (5)
   Scalar sigma_leader_m = Scalar(0);  ///< of the leader's position, per axis
+
+  /// Names every member, in the order of stored records.
+  template <class Visitor>
+  void visit(Visitor&& v) {
+    v("leader_x_m", leader_x_m);
+    v("leader_y_m", leader_y_m);
+    v("sigma_range_m", sigma_range_m);
+    v("sigma_leader_m", sigma_leader_m);
+  }
 };
 
 template <class Scalar_, int N>
@@ -39,12 +48,19 @@ struct LeaderRange : MeasurementModel<LeaderRange<Scalar_, N>, Scalar_, N, 1, 2>
   using typename Base::ObservedState;
   using typename Base::State;
   static constexpr bool kClosedForm = true;
+  static constexpr int kPlace = 2;
 
   using Params = LeaderRangeParams<Scalar>;
 
   Params params;
 
   explicit LeaderRange(const Params& p = Params()) : params(p) {}
+
+  /// Moves the leader to (p[0], p[1]) [m].
+  void place(const Scalar* p) {
+    params.leader_x_m = p[0];
+    params.leader_y_m = p[1];
+  }
 
   struct Expansion {
     Scalar range, inverse;  // inverse: 1 / range; 0 at the leader

@@ -19,6 +19,9 @@
 //                                 for the EKF: takes the mean of the second-order term of h, over
 //                                 the belief with P_oo = root root', off the innovation and adds
 //                                 its covariance to `noise`
+//     kPlace, place(p)            how many numbers say where the sensor stands (a station, a
+//     leader),
+//                                 and the setter: for records in which it moves
 //     near_field(point, P, z, innovation, noise)
 //                                 for a model with M = Observed: true where h is useless at the
 //                                 scale of the belief; the filter then takes the measurement as one
@@ -45,6 +48,7 @@ struct MeasurementModel {
   static constexpr int kSize = M;
   static constexpr int kObserved = Observed;
   static constexpr bool kClosedForm = false;
+  static constexpr int kPlace = 0;
 
   /// h about x, with deviations by subtraction (wrapped by `residual`).
   struct NumericExpansion {
@@ -76,6 +80,8 @@ struct MeasurementModel {
   NumericExpansion about(const State& x) const {
     return NumericExpansion{derived(), x, derived().h(x)};
   }
+
+  void place(const Scalar*) {}
 
   Measurement residual(const Measurement& z, const Measurement& predicted) const {
     Measurement difference;

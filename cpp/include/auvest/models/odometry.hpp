@@ -27,6 +27,14 @@ struct Odometry : ProcessModel<Odometry<Scalar_>, Scalar_, 3> {
     Scalar sigma_distance = Scalar(0.05);  ///< of the distance of one increment [1]
     Scalar sigma_drift = Scalar(0.1);      ///< [m/sqrt(s)]
     Scalar sigma_turn = Scalar(0.001);     ///< [rad/sqrt(s)]
+
+    /// Names every member, in the order of stored records.
+    template <class Visitor>
+    void visit(Visitor&& v) {
+      v("sigma_distance", sigma_distance);
+      v("sigma_drift", sigma_drift);
+      v("sigma_turn", sigma_turn);
+    }
   };
 
   Params params;

@@ -16,7 +16,8 @@
 //     kLinear                true if f is linear in x: the UKF then calls propagate, which is exact
 //     Input, input           type and value of what drives the process (a Vector), for
 //                            predict(dt, input)
-//     position_variance(...) trace of the position block of P after dt (interval policies)
+//     position_variance(belief, dt)
+//                            P_xx + P_yy after dt, for interval policies
 #pragma once
 
 #include "auvest/math/linear_algebra.hpp"
@@ -66,6 +67,14 @@ struct ProcessModel {
       for (int j = 0; j <= i; ++j) belief.P(i, j) = belief.P(i, j) + noise(i, j);
     }
     belief.x = derived().f(belief.x, dt);
+  }
+
+  /// P_xx + P_yy (the variances of the first two states) after dt seconds under the input as it is.
+  Scalar position_variance(const Belief<Scalar, N>& belief, Scalar dt) const {
+    Belief<Scalar, N> later = belief;
+    math::mirror_lower(later.P);
+    derived().propagate(later, dt);
+    return N > 1 ? later.P(0, 0) + later.P(N > 1 ? 1 : 0, N > 1 ? 1 : 0) : later.P(0, 0);
   }
 
   State residual(const State& a, const State& b) const {

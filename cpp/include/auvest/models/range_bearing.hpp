@@ -40,6 +40,7 @@ struct RangeBearing : MeasurementModel<RangeBearing<Scalar_, N>, Scalar_, N, 2, 
   using typename Base::ObservedState;
   using typename Base::State;
   static constexpr bool kClosedForm = true;
+  static constexpr int kPlace = 2;
 
   struct Params {
     Scalar station_x_m = Scalar(0.2);         ///< b_x, Table 1
@@ -49,11 +50,27 @@ struct RangeBearing : MeasurementModel<RangeBearing<Scalar_, N>, Scalar_, N, 2, 
     /// Position form below this many standard deviations sqrt(P_xx + P_yy) of range: enough that
     /// the estimate is never on the wrong side of the station. 0: only below 1e-15 m.
     Scalar near_field = Scalar(5);
+
+    /// Names every member, in the order of stored records.
+    template <class Visitor>
+    void visit(Visitor&& v) {
+      v("station_x_m", station_x_m);
+      v("station_y_m", station_y_m);
+      v("sigma_range_m", sigma_range_m);
+      v("sigma_bearing_rad", sigma_bearing_rad);
+      v("near_field", near_field);
+    }
   };
 
   Params params;
 
   explicit constexpr RangeBearing(const Params& p = Params()) : params(p) {}
+
+  /// Moves the station to (p[0], p[1]) [m].
+  void place(const Scalar* p) {
+    params.station_x_m = p[0];
+    params.station_y_m = p[1];
+  }
 
   struct Expansion {
     Scalar offset[2];  // D

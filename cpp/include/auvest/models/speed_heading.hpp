@@ -30,6 +30,16 @@ struct SpeedHeadingParams {
   Scalar sigma_heading = Scalar(0.0174533);  ///< s_th [rad/sqrt(Hz)], Eq. (2); 1 deg
   Scalar bias_walk = Scalar(1e-4);           ///< of the heading bias [rad/sqrt(s)]
   Scalar scale_walk = Scalar(1e-4);          ///< of the speed scale [1/sqrt(s)]
+
+  /// Names every member, in the order of stored records.
+  template <class Visitor>
+  void visit(Visitor&& v) {
+    v("sigma_forward", sigma_forward);
+    v("sigma_starboard", sigma_starboard);
+    v("sigma_heading", sigma_heading);
+    v("bias_walk", bias_walk);
+    v("scale_walk", scale_walk);
+  }
 };
 
 template <class Scalar_, bool HeadingBias = false, bool SpeedScale = false>

@@ -19,6 +19,14 @@ struct Hampel : Kernel<Hampel<Scalar_>, Scalar_> {
     Scalar a = Scalar(1.7);  ///< [sigma], > 0: full weight below
     Scalar b = Scalar(3.4);  ///< [sigma], >= a: the influence falls above
     Scalar c = Scalar(8.5);  ///< [sigma], >= b: rejected from here on
+
+    /// Names every member, in the order of stored records.
+    template <class Visitor>
+    void visit(Visitor&& v) {
+      v("a", a);
+      v("b", b);
+      v("c", c);
+    }
   };
 
   Params params;

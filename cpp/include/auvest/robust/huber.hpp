@@ -15,6 +15,12 @@ struct Huber : Kernel<Huber<Scalar_>, Scalar_> {
 
   struct Params {
     Scalar k = Scalar(1.345);  ///< [sigma], > 0; 1.345 keeps 95 % efficiency on Gaussian noise
+
+    /// Names every member, in the order of stored records.
+    template <class Visitor>
+    void visit(Visitor&& v) {
+      v("k", k);
+    }
   };
 
   Params params;

@@ -22,6 +22,13 @@ struct Igg : Kernel<Igg<Scalar_>, Scalar_> {
   struct Params {
     Scalar k0 = Scalar(1.5);  ///< [sigma], > 0: full weight below, Eq. (20)
     Scalar k1 = Scalar(3);    ///< [sigma], >= k0: rejected from here on, Eq. (20); often 2.5
+
+    /// Names every member, in the order of stored records.
+    template <class Visitor>
+    void visit(Visitor&& v) {
+      v("k0", k0);
+      v("k1", k1);
+    }
   };
 
   Params params;

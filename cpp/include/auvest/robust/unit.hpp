@@ -9,7 +9,10 @@ namespace auvest {
 template <class Scalar_>
 struct Unit : Kernel<Unit<Scalar_>, Scalar_> {
   using Scalar = Scalar_;
-  struct Params {};
+  struct Params {
+    template <class Visitor>
+    void visit(Visitor&&) {}
+  };
 
   explicit Unit(const Params& = Params()) {}
 

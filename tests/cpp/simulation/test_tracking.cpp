@@ -9,7 +9,7 @@
 #include "auvest/intervals/fixed_interval.hpp"
 #include "auvest/models/constant_acceleration.hpp"
 #include "auvest/models/range_bearing.hpp"
-#include "auvest/scenarios/tracking.hpp"
+#include "simulation/tracking.hpp"
 
 namespace {
 

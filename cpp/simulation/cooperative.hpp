@@ -150,7 +150,8 @@ inline Status cooperate(Filter& filter,
     double heading_error = 0;
     random.normal_pair(speed_error, heading_error);
     const double per_sample = 1 / math::sqrt(scenario.dt_s);
-    Vector<Scalar, 3> input;
+    typename Filter::Process::Input input;
+    math::set_zero(input);
     input(0) = static_cast<Scalar>(fleet.speed + per_sample * scenario.sigma_speed * speed_error);
     input(1) = Scalar(0);
     input(2) =

@@ -7,7 +7,7 @@
 #include <cstdint>
 
 #include "auvest/auvest.hpp"
-#include "auvest/scenarios/cooperative.hpp"
+#include "simulation/cooperative.hpp"
 
 namespace {
 

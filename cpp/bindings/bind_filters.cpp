@@ -1,0 +1,549 @@
+// The filters of the family, in both precisions, and what they are made of.
+//
+// Single steps are fast: arguments in their usual forms are read here, and whatever is not in such
+// a form is answered with kUnclear, upon which the Python layer looks closer, converts or explains.
+#include <cmath>
+
+#include "desk/catalogue.hpp"
+#include "handles.hpp"
+
+namespace auvest {
+namespace bindings {
+namespace {
+
+using desk::kMaxInputs;
+using desk::kMaxPlace;
+using desk::kMaxSize;
+
+/// Answers of single steps; from 0 on they are a Status.
+const int kUnclear = -1;
+
+/// A number that Python has as a float or an int; false for anything else, and for what `Scalar`
+/// cannot hold.
+template <class Scalar>
+bool read_number(PyObject* object, Scalar& value) {
+  double given;
+  if (PyFloat_Check(object)) {
+    given = PyFloat_AS_DOUBLE(object);
+  } else if (PyLong_CheckExact(object)) {
+    given = PyLong_AsDouble(object);
+    if (PyErr_Occurred() != nullptr) {
+      PyErr_Clear();
+      return false;
+    }
+  } else {
+    return false;
+  }
+  value = static_cast<Scalar>(given);
+  return std::isfinite(value) || std::isnan(given);
+}
+
+template <class Scalar, class Element>
+bool read_elements(const py::array& array, Scalar* values, int size) {
+  for (int i = 0; i < size; ++i) {
+    const Element given = *static_cast<const Element*>(array.data(i));
+    values[i] = static_cast<Scalar>(given);
+    if (!std::isfinite(values[i]) && !std::isnan(given)) return false;
+  }
+  return true;
+}
+
+/// Exactly `size` numbers: a list, a tuple or an array of floats; one number may stand for itself.
+template <class Scalar>
+bool read_numbers(const py::handle& object, Scalar* values, int size) {
+  PyObject* const given = object.ptr();
+  if (size == 1 && read_number(given, values[0])) return true;
+  if (PyList_CheckExact(given) || PyTuple_CheckExact(given)) {
+    if (PySequence_Fast_GET_SIZE(given) != size) return false;
+    for (int i = 0; i < size; ++i) {
+      if (!read_number(PySequence_Fast_GET_ITEM(given, i), values[i])) return false;
+    }
+    return true;
+  }
+  if (!py::isinstance<py::array>(object)) return false;
+  const auto array = py::reinterpret_borrow<py::array>(object);
+  if (array.ndim() != 1 || array.shape(0) != size) return false;
+  const char kind = array.dtype().kind();
+  const auto width = array.itemsize();
+  if (kind != 'f' || array.dtype().byteorder() == '>') return false;
+  if (width == 8) return read_elements<Scalar, double>(array, values, size);
+  if (width == 4) return read_elements<Scalar, float>(array, values, size);
+  return false;
+}
+
+template <class Scalar>
+int predict(FilterHandle<Scalar>& handle, const py::object& dt, const py::object& input) {
+  const Occupied<Scalar> occupied(handle);
+  Scalar step = std::numeric_limits<Scalar>::quiet_NaN();  // the filter's own interval
+  if (!dt.is_none() && (!read_number(dt.ptr(), step) || !(step >= Scalar(0)))) return kUnclear;
+  Scalar values[kMaxInputs];
+  const int inputs = handle.filter->inputs();
+  if (input.is_none() != (inputs == 0)) return kUnclear;
+  if (inputs > 0) {
+    if (!read_numbers(input, values, inputs)) return kUnclear;
+    for (int i = 0; i < inputs; ++i) {
+      if (std::isnan(values[i])) return kUnclear;
+    }
+  }
+  handle.status = handle.filter->predict(step, values);
+  return static_cast<int>(handle.status);
+}
+
+template <class Scalar>
+int update(FilterHandle<Scalar>& handle, const py::object& z, const SensorHandle<Scalar>& sensor,
+           const py::object& place, const py::object& age) {
+  const Occupied<Scalar> occupied(handle);
+  if (sensor->states != handle.filter->states()) return kUnclear;
+  Scalar values[kMaxSize];
+  Scalar there[kMaxPlace];
+  Scalar elapsed = Scalar(0);
+  bool missing = z.is_none();
+  if (!missing) {
+    if (!read_numbers(z, values, sensor->size)) return kUnclear;
+    int gone = 0;
+    for (int i = 0; i < sensor->size; ++i) gone += std::isnan(values[i]) ? 1 : 0;
+    if (gone > 0 && gone < sensor->size) return kUnclear;
+    missing = gone > 0;
+  }
+  if (!place.is_none()) {
+    if (sensor->place == 0 || !read_numbers(place, there, sensor->place)) return kUnclear;
+    for (int i = 0; i < sensor->place; ++i) {
+      if (std::isnan(there[i])) return kUnclear;
+    }
+  }
+  if (!age.is_none() && (!read_number(age.ptr(), elapsed) || !(elapsed >= Scalar(0)))) {
+    return kUnclear;
+  }
+  if (missing) {
+    handle.report = desk::Report<Scalar>();
+    handle.status = Status::kOk;
+    return 0;
+  }
+  const auto report =
+      handle.filter->update(values, sensor, place.is_none() ? nullptr : there, elapsed);
+  handle.status = report.status;
+  if (report.status == Status::kOk) handle.report = report;
+  return static_cast<int>(report.status);
+}
+
+template <class Scalar>
+int feedback(FilterHandle<Scalar>& handle, const py::object& reference) {
+  const Occupied<Scalar> occupied(handle);
+  Scalar desired[2];
+  if (!reference.is_none()) {
+    if (!read_numbers(reference, desired, 2)) return kUnclear;
+    if (std::isnan(desired[0]) || std::isnan(desired[1])) return kUnclear;
+  }
+  handle.status = handle.filter->feedback(reference.is_none() ? nullptr : desired);
+  return static_cast<int>(handle.status);
+}
+
+template <class Scalar>
+py::array_t<Scalar> vector(const Scalar* values, int size) {
+  return py::array_t<Scalar>(size, values);
+}
+
+/// What the last update reported as a dict; None if nothing was measured.
+template <class Scalar>
+py::object report(const FilterHandle<Scalar>& handle) {
+  const auto& r = handle.report;
+  if (r.size == 0) return py::none();
+  py::dict result;
+  result["innovation"] = vector(r.innovation, r.size);
+  result["S"] = vector(r.S, r.size * r.size).reshape({r.size, r.size});
+  result["nis"] = r.nis;
+  result["near_field"] = r.near_field;
+  result["standardised"] = vector(r.standardised, r.size);
+  result["weight"] = vector(r.weight, r.size);
+  result["decision"] = r.decision;
+  result["iterations"] = r.iterations;
+  result["recovered"] = r.recovered;
+  return result;
+}
+
+/// A column of `record`, or null where it is None; the Python layer has checked the shapes.
+template <class Element>
+const Element* column(const py::dict& record, const char* name) {
+  const py::object value = record[name];
+  if (value.is_none()) return nullptr;
+  return py::cast<py::array_t<Element, py::array::c_style>>(value).data();
+}
+
+/// Rows of a record; see desk::Record. Gives how many were done, the status and the columns.
+template <class Scalar>
+py::tuple run(FilterHandle<Scalar>& handle, const py::dict& given, const py::list& sensors,
+              bool covariance) {
+  const Occupied<Scalar> occupied(handle);
+  const auto z = given["z"].cast<Array<Scalar>>();
+  desk::Record<Scalar> record;
+  record.rows = static_cast<std::size_t>(z.shape(0));
+  record.width = static_cast<std::size_t>(z.shape(1));
+  record.z = z.data();
+  record.dt = column<Scalar>(given, "dt");
+  record.input = column<Scalar>(given, "input");
+  record.place = column<Scalar>(given, "place");
+  record.age = column<Scalar>(given, "age_s");
+  record.reference = column<Scalar>(given, "reference");
+  record.sensor = column<std::int32_t>(given, "sensor");
+  for (const auto& sensor : sensors) {
+    record.sensors.push_back(sensor.cast<SensorHandle<Scalar>>());
+  }
+
+  const py::ssize_t rows = z.shape(0);
+  const py::ssize_t m = z.shape(1);
+  const py::ssize_t n = handle.filter->states();
+  const py::ssize_t full = covariance ? rows : 0;
+  py::array_t<Scalar> x({rows, n}), p({full, n, n}), s({full, m, m});
+  py::array_t<Scalar> innovation({rows, m}), standardised({rows, m}), weight({rows, m});
+  py::array_t<Scalar> nis(rows), interval(rows);
+  py::array_t<std::uint8_t> decision(rows), iterations(rows);
+  py::array_t<bool> near_field(rows), recovered(rows), too_late(rows);
+  desk::Columns<Scalar> out;
+  out.x = x.mutable_data();
+  out.P = covariance ? p.mutable_data() : nullptr;
+  out.innovation = innovation.mutable_data();
+  out.S = covariance ? s.mutable_data() : nullptr;
+  out.standardised = standardised.mutable_data();
+  out.weight = weight.mutable_data();
+  out.nis = nis.mutable_data();
+  out.interval = interval.mutable_data();
+  out.decision = decision.mutable_data();
+  out.iterations = iterations.mutable_data();
+  out.near_field = near_field.mutable_data();
+  out.recovered = recovered.mutable_data();
+  out.too_late = too_late.mutable_data();
+  std::size_t done;
+  {
+    py::gil_scoped_release release;
+    done = handle.filter->run(record, out, handle.report, handle.status);
+  }
+  py::dict result;
+  result["x"] = x;
+  result["P"] = p;
+  result["innovation"] = innovation;
+  result["S"] = s;
+  result["nis"] = nis;
+  result["near_field"] = near_field;
+  result["standardised"] = standardised;
+  result["weight"] = weight;
+  result["decision"] = decision;
+  result["iterations"] = iterations;
+  result["recovered"] = recovered;
+  result["interval_s"] = interval;
+  result["too_late"] = too_late;
+  return py::make_tuple(done, handle.status, result);
+}
+
+template <class Scalar>
+py::array_t<Scalar> numbers(const std::vector<Scalar>& values) {
+  return py::array_t<Scalar>(static_cast<py::ssize_t>(values.size()), values.data());
+}
+
+template <class Scalar>
+std::vector<Scalar> numbers(const py::dict& state, const char* name) {
+  const auto array = state[name].cast<Array<Scalar>>();
+  require_shape(array, {-1}, name);
+  return std::vector<Scalar>(array.data(), array.data() + array.size());
+}
+
+/// The state as flat arrays, and the descriptions of the sensors of remembered updates ("" for a
+/// prediction).
+template <class Scalar>
+py::tuple save(const FilterHandle<Scalar>& handle) {
+  require_idle(handle);
+  const auto state = handle.filter->save();
+  py::dict result;
+  result["x"] = numbers(state.x);
+  result["P"] = numbers(state.P);
+  result["input"] = numbers(state.input);
+  result["policy"] = numbers(state.policy);
+  result["recovery"] = numbers(state.recovery);
+  result["base"] = numbers(state.base);
+  result["events"] = numbers(state.events);
+  py::list sensors;
+  for (const auto& sensor : state.sensors) {
+    sensors.append(sensor == nullptr ? std::string() : sensor->description);
+  }
+  return py::make_tuple(result, sensors);
+}
+
+/// Takes back what save() gave; `sensors` are handles, None for a prediction.
+template <class Scalar>
+void restore(FilterHandle<Scalar>& handle, const py::dict& given, const py::list& sensors) {
+  const Occupied<Scalar> occupied(handle);
+  desk::FilterState<Scalar> state;
+  state.x = numbers<Scalar>(given, "x");
+  state.P = numbers<Scalar>(given, "P");
+  state.input = numbers<Scalar>(given, "input");
+  state.policy = numbers<Scalar>(given, "policy");
+  state.recovery = numbers<Scalar>(given, "recovery");
+  state.base = numbers<Scalar>(given, "base");
+  state.events = numbers<Scalar>(given, "events");
+  for (const auto& sensor : sensors) {
+    state.sensors.push_back(sensor.is_none() ? nullptr : sensor.cast<SensorHandle<Scalar>>());
+  }
+  require_ok(handle.filter->restore(state));
+  handle.status = Status::kOk;
+}
+
+/// The report and the status as they were when the filter was saved.
+template <class Scalar>
+void set_report(FilterHandle<Scalar>& handle, const py::object& given, Status status) {
+  desk::Report<Scalar> r;
+  if (!given.is_none()) {
+    const auto values = given.cast<py::dict>();
+    const auto take = [&values](const char* name, Scalar* out, int size) {
+      const auto array = values[name].cast<Array<Scalar>>();
+      if (array.size() != size) throw py::value_error(std::string(name) + " has the wrong size");
+      std::copy_n(array.data(), size, out);
+    };
+    r.size = static_cast<int>(values["innovation"].cast<Array<Scalar>>().size());
+    if (r.size < 1 || r.size > kMaxSize) throw py::value_error("innovation has the wrong size");
+    take("innovation", r.innovation, r.size);
+    take("S", r.S, r.size * r.size);
+    take("standardised", r.standardised, r.size);
+    take("weight", r.weight, r.size);
+    r.nis = values["nis"].cast<Scalar>();
+    r.near_field = values["near_field"].cast<bool>();
+    r.decision = values["decision"].cast<Decision>();
+    r.iterations = values["iterations"].cast<std::uint8_t>();
+    r.recovered = values["recovered"].cast<bool>();
+  }
+  handle.report = r;
+  handle.status = status;
+}
+
+template <class Scalar>
+desk::FilterOptions<Scalar> to_options(const py::dict& given, const AnyKernel<Scalar>& kernel,
+                                       const AnyInterval<Scalar>& policy) {
+  using Kind = typename AnyLinearisation<Scalar>::Kind;
+  desk::FilterOptions<Scalar> options;
+  options.kind = static_cast<Kind>(given["linearisation"].cast<std::uint8_t>());
+  options.points =
+      from_dict<typename SigmaPoints<Scalar>::Params>(given["points"].cast<py::dict>());
+  AnyRecovery<Scalar> recovery;
+  const auto rejections = given["rejections"].cast<std::uint8_t>();  // 0: no recovery
+  recovery.enabled = rejections > 0;
+  if (recovery.enabled) recovery.streak.params.rejections = rejections;
+  typename desk::FilterOptions<Scalar>::Rule::Params params;
+  params.residual = given["post_fit"].cast<bool>() ? Residual::kPostFit : Residual::kInnovation;
+  params.max_iterations = given["max_iterations"].cast<std::uint8_t>();
+  params.tolerance = given["tolerance"].cast<Scalar>();
+  options.rule = typename desk::FilterOptions<Scalar>::Rule(kernel, recovery, params);
+  require_ok(options.rule.check());
+  options.policy = policy;
+  options.late_s = given["late_s"].cast<Scalar>();
+  return options;
+}
+
+template <class Scalar>
+py::object law(const FilterHandle<Scalar>& handle) {
+  const auto& policy = handle.filter->policy();
+  if (policy.kind != AnyInterval<Scalar>::Kind::kMahalanobis) return py::none();
+  const auto& m = policy.mahalanobis.memory;
+  py::dict result;
+  result["tau"] = m.tau;
+  result["ratio"] = m.ratio;
+  result["mahalanobis_squared"] = m.mahalanobis_squared;
+  return result;
+}
+
+template <class Scalar>
+void bind_precision(py::module_& m) {
+  using Filter = FilterHandle<Scalar>;
+  using Process = desk::AnyProcess<Scalar>;
+  using Sensor = desk::AnySensor<Scalar>;
+
+  py::class_<Process, std::shared_ptr<Process>>(m, named<Scalar>("Process").c_str(),
+                                                "A process model.")
+      .def_readonly("states", &Process::states)
+      .def_readonly("inputs", &Process::inputs)
+      .def(
+          "f",
+          [](const Process& p, const Array<Scalar>& x, Scalar dt, const Array<Scalar>& input) {
+            require_shape(x, {p.states}, "x");
+            require_shape(input, {p.inputs}, "input");
+            py::array_t<Scalar> out(p.states);
+            p.f(x.data(), dt, input.data(), out.mutable_data());
+            return out;
+          },
+          py::arg("x").noconvert(), py::arg("dt"), py::arg("input").noconvert(),
+          "The state (n,) after dt seconds.")
+      .def(
+          "Phi",
+          [](const Process& p, const Array<Scalar>& x, Scalar dt, const Array<Scalar>& input) {
+            require_shape(x, {p.states}, "x");
+            require_shape(input, {p.inputs}, "input");
+            py::array_t<Scalar> out({p.states, p.states});
+            p.Phi(x.data(), dt, input.data(), out.mutable_data());
+            return out;
+          },
+          py::arg("x").noconvert(), py::arg("dt"), py::arg("input").noconvert(),
+          "Jacobian (n, n) of f.")
+      .def(
+          "Q",
+          [](const Process& p, Scalar dt, const Array<Scalar>& input) {
+            require_shape(input, {p.inputs}, "input");
+            py::array_t<Scalar> out({p.states, p.states});
+            p.Q(dt, input.data(), out.mutable_data());
+            return out;
+          },
+          py::arg("dt"), py::arg("input").noconvert(), "Process noise covariance (n, n).");
+
+  py::class_<Sensor, std::shared_ptr<Sensor>>(m, named<Scalar>("Sensor").c_str(),
+                                              "A measurement model for a number of states.")
+      .def_readonly("states", &Sensor::states)
+      .def_readonly("size", &Sensor::size)
+      .def_readonly("place", &Sensor::place)
+      .def_readwrite("description", &Sensor::description)
+      .def(
+          "h",
+          [](const Sensor& sensor, const Array<Scalar>& x) {
+            require_shape(x, {-1, sensor.states}, "x");
+            py::array_t<Scalar> z({x.shape(0), py::ssize_t(sensor.size)});
+            sensor.measure(x.data(), z.mutable_data(), static_cast<std::size_t>(x.shape(0)));
+            return z;
+          },
+          py::arg("x").noconvert(), "Noise-free measurements (K, m) of states (K, n).");
+
+  py::class_<Filter>(m, named<Scalar>("Filter").c_str(), "A filter of the family.")
+      .def(py::init([](const std::shared_ptr<Process>& process, const AnyKernel<Scalar>& kernel,
+                       const AnyInterval<Scalar>& policy, const py::dict& options) {
+             Filter made;
+             made.filter = process->filter(process, to_options(options, kernel, policy));
+             if (made.filter == nullptr) throw StatusError(Status::kBadParameter);
+             return made;
+           }),
+           py::arg("process"), py::arg("kernel"), py::arg("policy"), py::arg("options"))
+      .def(
+          "reset",
+          [](Filter& f, const Array<Scalar>& x0, const Array<Scalar>& p0,
+             const Array<Scalar>& reference) {
+            const Occupied<Scalar> occupied(f);
+            const py::ssize_t n = f.filter->states();
+            require_shape(x0, {n}, "x0");
+            require_shape(p0, {n, n}, "P0");
+            require_shape(reference, {2}, "reference");
+            require_ok(f.filter->reset(x0.data(), p0.data(), reference.data()));
+            f.report = desk::Report<Scalar>();
+          },
+          py::arg("x0").noconvert(), py::arg("P0").noconvert(), py::arg("reference").noconvert())
+      .def("predict", &predict<Scalar>, py::arg("dt"), py::arg("input"))
+      .def("update", &update<Scalar>, py::arg("z"), py::arg("sensor"), py::arg("place"),
+           py::arg("age_s"))
+      .def("feedback", &feedback<Scalar>, py::arg("reference"))
+      .def("run", &run<Scalar>, py::arg("record"), py::arg("sensors"), py::arg("covariance"))
+      .def("save", &save<Scalar>)
+      .def("restore", &restore<Scalar>, py::arg("state"), py::arg("sensors"))
+      .def("set_report", &set_report<Scalar>, py::arg("report"), py::arg("status"))
+      .def_property_readonly("report", &report<Scalar>)
+      .def_property_readonly("law", &law<Scalar>)
+      .def_readonly("status", &Filter::status)
+      .def_property_readonly("nis",
+                             [](const Filter& f) {
+                               return f.report.size > 0 ? f.report.nis
+                                                        : std::numeric_limits<Scalar>::quiet_NaN();
+                             })
+      .def_property_readonly("interval",
+                             [](const Filter& f) {
+                               require_idle(f);
+                               return f.filter->interval();
+                             })
+      .def_property_readonly("x",
+                             [](const Filter& f) {
+                               require_idle(f);
+                               py::array_t<Scalar> x(f.filter->states());
+                               f.filter->x(x.mutable_data());
+                               return x;
+                             })
+      .def_property_readonly("P", [](const Filter& f) {
+        require_idle(f);
+        py::array_t<Scalar> p({f.filter->states(), f.filter->states()});
+        f.filter->P(p.mutable_data());
+        return p;
+      });
+
+  auto* catalogue = new desk::Catalogue<Scalar>();  // lives as long as the module
+  desk::add_models<2>(*catalogue);
+  desk::add_models<3>(*catalogue);
+  desk::add_models<4>(*catalogue);
+  desk::add_models<6>(*catalogue);
+  m.def(
+      named<Scalar>("make_process").c_str(),
+      [catalogue](const std::string& name, const Array<Scalar>& values) {
+        const auto& entry = catalogue->processes.at(name);
+        require_shape(values, {py::ssize_t(entry.parameters.names.size())}, "values");
+        const auto process = entry.make(values.data());
+        if (process == nullptr) throw StatusError(Status::kBadParameter);
+        return std::const_pointer_cast<Process>(process);
+      },
+      py::arg("name"), py::arg("values").noconvert());
+  m.def(
+      named<Scalar>("make_sensor").c_str(),
+      [catalogue](const std::string& name, int states, const Array<Scalar>& values) {
+        const auto& entry = catalogue->sensors.at({name, states});
+        require_shape(values, {py::ssize_t(entry.parameters.names.size())}, "values");
+        const auto sensor = entry.make(values.data());
+        if (sensor == nullptr) throw StatusError(Status::kBadParameter);
+        return sensor;
+      },
+      py::arg("name"), py::arg("states"), py::arg("values").noconvert());
+  if (!std::is_same<Scalar, double>::value) return;
+
+  const auto defaults = [](const desk::Parameters& parameters) {
+    py::dict result;
+    for (std::size_t i = 0; i < parameters.names.size(); ++i) {
+      result[parameters.names[i].c_str()] = parameters.defaults[i];
+    }
+    return result;
+  };
+  m.def(
+      "process_defaults",
+      [catalogue, defaults](const std::string& name) {
+        return defaults(catalogue->processes.at(name).parameters);
+      },
+      py::arg("name"), "The parameters of a process by name, in the order of make_process.");
+  m.def(
+      "sensor_defaults",
+      [catalogue, defaults](const std::string& name) {
+        for (const auto& entry : catalogue->sensors) {
+          if (entry.first.first == name) return defaults(entry.second.parameters);
+        }
+        throw py::key_error(name);
+      },
+      py::arg("name"), "The parameters of a sensor by name, in the order of make_sensor.");
+  m.def(
+      "sensor_states",
+      [catalogue](const std::string& name) {
+        py::list states;
+        for (const auto& entry : catalogue->sensors) {
+          if (entry.first.first == name) states.append(entry.first.second);
+        }
+        return states;
+      },
+      py::arg("name"), "Numbers of states that a sensor is made for.");
+  m.def(
+      "models",
+      [catalogue] {
+        py::list processes, sensors;
+        for (const auto& entry : catalogue->processes) processes.append(entry.first);
+        for (const auto& entry : catalogue->sensors) {
+          sensors.append(py::make_tuple(entry.first.first, entry.first.second));
+        }
+        return py::make_tuple(processes, sensors);
+      },
+      "Names of all processes, and names and numbers of states of all sensors.");
+}
+
+}  // namespace
+
+void bind_filters(py::module_& m) {
+  m.attr("UNCLEAR") = kUnclear;
+  m.attr("MAX_PLACE") = kMaxPlace;
+  bind_precision<float>(m);
+  bind_precision<double>(m);
+  m.def("sigma_points_defaults", [] { return to_dict(SigmaPoints<double>::Params()); });
+}
+
+}  // namespace bindings
+}  // namespace auvest

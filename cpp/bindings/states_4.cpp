@@ -1,0 +1,11 @@
+// The models of the registry whose state has 4 numbers, compiled.
+#include "auvest/registry.hpp"
+#include "desk/catalogue.hpp"
+
+namespace auvest {
+namespace desk {
+
+AUVEST_DEFINE_MODELS(4)
+
+}  // namespace desk
+}  // namespace auvest

@@ -1,0 +1,99 @@
+// What can be made by name: processes, and sensors for a number of states, from their parameters as
+// numbers in the order in which Params::visit names them.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "desk/filter.hpp"
+
+namespace auvest {
+namespace desk {
+
+/// Names and defaults of a model's parameters.
+struct Parameters {
+  std::vector<std::string> names;
+  std::vector<double> defaults;
+};
+
+template <class Scalar, class Made>
+struct Entry {
+  Parameters parameters;
+  /// Null where a parameter is out of range.
+  std::function<std::shared_ptr<Made>(const Scalar*)> make;
+};
+
+template <class Scalar>
+struct Catalogue {
+  std::map<std::string, Entry<Scalar, const AnyProcess<Scalar>>> processes;
+  /// By name and number of states.
+  std::map<std::pair<std::string, int>, Entry<Scalar, AnySensor<Scalar>>> sensors;
+};
+
+template <class Params>
+Parameters parameters_of() {
+  Parameters result;
+  Params params;
+  params.visit([&result](const char* name, const auto& value) {
+    result.names.emplace_back(name);
+    result.defaults.push_back(static_cast<double>(value));
+  });
+  return result;
+}
+
+template <class Params, class Scalar>
+Params params_from(const Scalar* values) {
+  Params params;
+  params.visit([&values](const char*, Scalar& value) { value = *values++; });
+  return params;
+}
+
+template <class Process, class Scalar>
+void add_process(Catalogue<Scalar>& catalogue, const char* name) {
+  using Params = typename Process::Params;
+  auto& entry = catalogue.processes[name];
+  entry.parameters = parameters_of<Params>();
+  entry.make = [](const Scalar* values) -> std::shared_ptr<const AnyProcess<Scalar>> {
+    const Process process(params_from<Params>(values));
+    if (process.check() != Status::kOk) return nullptr;
+    return std::make_shared<const ProcessOf<Process>>(process);
+  };
+}
+
+template <class Model, class Scalar>
+void add_sensor(Catalogue<Scalar>& catalogue, const char* name) {
+  using Params = typename Model::Params;
+  auto& entry = catalogue.sensors[{name, Model::kStates}];
+  entry.parameters = parameters_of<Params>();
+  entry.make = [](const Scalar* values) -> std::shared_ptr<AnySensor<Scalar>> {
+    const Model model(params_from<Params>(values));
+    if (model.check() != Status::kOk) return nullptr;
+    return std::make_shared<SensorOf<Model>>(model);
+  };
+}
+
+/// The models of the registry for N states: states_<N>.cpp.
+template <int N, class Scalar>
+void add_models(Catalogue<Scalar>& catalogue);
+
+#define AUVEST_ADD_PROCESS(name, ...) \
+  if constexpr (__VA_ARGS__::kStates == N) add_process<__VA_ARGS__>(catalogue, name);
+#define AUVEST_ADD_SENSOR(name, Model, suits) \
+  if constexpr (suits) add_sensor<Model<Scalar, N>>(catalogue, name);
+
+/// Defines add_models for n states in both precisions. Needs auvest/registry.hpp.
+#define AUVEST_DEFINE_MODELS(n)                          \
+  template <int N, class Scalar>                         \
+  void add_models(Catalogue<Scalar>& catalogue) {        \
+    AUVEST_PROCESSES(AUVEST_ADD_PROCESS)                 \
+    AUVEST_SENSORS(AUVEST_ADD_SENSOR)                    \
+  }                                                      \
+  template void add_models<n, float>(Catalogue<float>&); \
+  template void add_models<n, double>(Catalogue<double>&);
+
+}  // namespace desk
+}  // namespace auvest

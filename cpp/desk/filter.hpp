@@ -1,0 +1,433 @@
+// A filter put together at run time: any process, linearisation, kernel, recovery and interval
+// policy, sensors of any kind, measurements of an earlier time, and whole records.
+//
+// It is the core's filters that run here: RuntimeRobust is their composition, and every model
+// brings its own compiled predict and update (models.hpp). Failure is a value, as everywhere.
+#pragma once
+
+#include <deque>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "auvest/filters/adaptive_interval.hpp"
+#include "auvest/filters/late_updates.hpp"
+#include "auvest/runtime/any_interval.hpp"
+#include "desk/models.hpp"
+
+namespace auvest {
+namespace desk {
+
+/// What a filter is made of, beside its process.
+template <class Scalar>
+struct FilterOptions {
+  using Linearisation = AnyLinearisation<Scalar>;
+  using Rule = RobustUpdate<AnyKernel<Scalar>, AnyRecovery<Scalar>>;
+
+  typename Linearisation::Kind kind = Linearisation::Kind::kEkf;
+  typename SigmaPoints<Scalar>::Params points;
+  Rule rule;
+  AnyInterval<Scalar> policy;
+  Scalar late_s = Scalar(0);  ///< how far back a measurement may belong [s]
+};
+
+/// Rows in: each predicts, corrects by what was measured, and chooses the next interval.
+template <class Scalar>
+struct Record {
+  std::size_t rows = 0;
+  std::size_t width = 0;                 ///< columns of z
+  const Scalar* z = nullptr;             ///< (rows, width); NaN throughout: missing
+  const Scalar* dt = nullptr;            ///< (rows) [s]; NaN: the interval that the filter chose
+  const Scalar* input = nullptr;         ///< (rows, inputs), or null
+  const Scalar* place = nullptr;         ///< (rows, 3), NaN: where the sensor stands; or null
+  const Scalar* age = nullptr;           ///< (rows) [s], or null: measured now
+  const Scalar* reference = nullptr;     ///< (rows, 2) [m], NaN: the estimate; or null: no feedback
+  const std::int32_t* sensor = nullptr;  ///< (rows) index into `sensors`, or null: the first
+  std::vector<std::shared_ptr<const AnySensor<Scalar>>> sensors;
+};
+
+/// Where the results go: a column each, row by row. P and S may be null.
+template <class Scalar>
+struct Columns {
+  Scalar* x;
+  Scalar* P;
+  Scalar* innovation;
+  Scalar* S;
+  Scalar* standardised;
+  Scalar* weight;
+  Scalar* nis;
+  Scalar* interval;
+  std::uint8_t* decision;
+  std::uint8_t* iterations;
+  bool* near_field;
+  bool* recovered;
+  bool* too_late;
+};
+
+/// All that a filter carries from step to step, as numbers.
+template <class Scalar>
+struct FilterState {
+  std::vector<Scalar> x, P;      ///< of the belief; P row by row
+  std::vector<Scalar> input;     ///< that drove the last prediction
+  std::vector<Scalar> policy;    ///< interval and the memory of the Mahalanobis law: 9 numbers
+  std::vector<Scalar> recovery;  ///< count, variance, two recent rejections: 8 numbers
+  std::vector<Scalar> base;      ///< of the late memory: x, P, input, recovery of its base
+  std::vector<Scalar> events;    ///< of the late memory: kEventNumbers each
+  std::vector<std::shared_ptr<const AnySensor<Scalar>>> sensors;  ///< of the events; null: predict
+};
+
+/// Numbers of an event: dt, input, z, moved, place.
+const std::size_t kEventNumbers = 1 + kMaxInputs + kMaxSize + 1 + kMaxPlace;
+
+template <class Scalar>
+class AnyFilter {
+ public:
+  virtual ~AnyFilter() = default;
+
+  virtual int states() const = 0;
+  virtual int inputs() const = 0;
+  virtual Status reset(const Scalar* x0, const Scalar* P0, const Scalar* reference) = 0;
+  /// dt: NaN for the filter's own interval. input: `inputs()` numbers.
+  virtual Status predict(Scalar dt, const Scalar* input) = 0;
+  /// z: as many numbers as the sensor gives. place: null for where the sensor stands.
+  virtual Report<Scalar> update(const Scalar* z,
+                                const std::shared_ptr<const AnySensor<Scalar>>& sensor,
+                                const Scalar* place, Scalar age) = 0;
+  /// reference: null for the estimate.
+  virtual Status feedback(const Scalar* reference) = 0;
+  /// Takes rows until one is refused, which leaves the filter at the row before; says how many were
+  /// done. A measurement that is older than the late memory is left out and marked.
+  virtual std::size_t run(const Record<Scalar>& record, const Columns<Scalar>& out,
+                          Report<Scalar>& last, Status& status) = 0;
+
+  virtual void x(Scalar* out) const = 0;
+  virtual void P(Scalar* out) const = 0;
+  virtual Scalar interval() const = 0;
+  virtual const AnyInterval<Scalar>& policy() const = 0;
+
+  virtual FilterState<Scalar> save() const = 0;
+  virtual Status restore(const FilterState<Scalar>& state) = 0;
+};
+
+/// Events of the last `window` seconds.
+template <class Event>
+class RecentEvents {
+ public:
+  using Scalar = typename Event::Scalar;
+
+  explicit RecentEvents(Scalar window) : window_(window), span_(Scalar(0)) {}
+
+  int size() const { return static_cast<int>(events_.size()); }
+  const Event& operator[](int k) const { return events_[static_cast<std::size_t>(k)]; }
+
+  /// True where the events without the first still reach back `window` seconds.
+  bool full() const { return !events_.empty() && !(span_ - events_.front().dt < window_); }
+
+  void insert(int at, const Event& event) {
+    events_.insert(events_.begin() + at, event);
+    span_ = span_ + event.dt;
+  }
+  void remove_first() {
+    events_.pop_front();
+    span_ = Scalar(0);  // a sum formed anew does not drift
+    for (const Event& event : events_) span_ = span_ + event.dt;
+  }
+
+ private:
+  Scalar window_;
+  Scalar span_;
+  std::deque<Event> events_;
+};
+
+template <class Scalar, int N>
+class FilterFor final : public AnyFilter<Scalar> {
+ public:
+  using Robust = RuntimeRobust<Scalar, N>;
+  using Adaptive = AdaptiveInterval<Robust, AnyInterval<Scalar>>;
+  using Sensor = PlacedSensor<Scalar, N>;
+  using Event = LateEvent<Robust, Sensor>;
+  using Events = RecentEvents<Event>;
+  using Memory = LateMemory<Robust, Sensor, Events>;
+  using Options = FilterOptions<Scalar>;
+
+  FilterFor(const std::shared_ptr<const ProcessFor<Scalar, N>>& process, const Options& options)
+      : filter_(robust(process, options), options.policy),
+        late_s_(options.late_s),
+        memory_(filter_, Events(options.late_s)) {}
+
+  const Adaptive& filter() const { return filter_; }
+
+  int states() const override { return N; }
+  int inputs() const override { return filter_.process().model->inputs; }
+
+  Status reset(const Scalar* x0, const Scalar* P0, const Scalar* reference) override {
+    typename Adaptive::State x;
+    typename Adaptive::Covariance p;
+    typename Adaptive::Position desired;
+    for (int i = 0; i < N; ++i) x(i) = x0[i];
+    for (int i = 0; i < N * N; ++i) p.data()[i] = P0[i];
+    for (int i = 0; i < 2; ++i) desired(i) = reference[i];
+    const Status status = filter_.reset(x, p, desired);
+    if (status == Status::kOk) memory_ = Memory(filter_, Events(late_s_));
+    return status;
+  }
+
+  Status predict(Scalar dt, const Scalar* input) override {
+    const Scalar elapsed = math::is_nan(dt) ? filter_.interval() : dt;
+    typename Event::Input values = Event::Input::Zero();
+    for (int i = 0; i < inputs(); ++i) values(i) = input[i];
+    Robust& robust = filter_;
+    return late() ? memory_.predict(robust, elapsed, values) : robust.predict(elapsed, values);
+  }
+
+  Report<Scalar> update(const Scalar* z, const std::shared_ptr<const AnySensor<Scalar>>& sensor,
+                        const Scalar* place, Scalar age) override {
+    Sensor placed;
+    placed.model = std::static_pointer_cast<const SensorFor<Scalar, N>>(sensor);
+    placed.moved = place != nullptr;
+    if (placed.moved) {
+      for (int i = 0; i < sensor->place; ++i) placed.place[i] = place[i];
+    }
+    typename Sensor::Measurement value = Sensor::Measurement::Zero();
+    for (int i = 0; i < sensor->size; ++i) value(i) = z[i];
+    Robust& robust = filter_;
+    if (late()) return memory_.update(robust, value, placed, age);
+    if (age != Scalar(0)) return Report<Scalar>(Status::kTimeBackwards);
+    return robust.update(value, placed);
+  }
+
+  Status feedback(const Scalar* reference) override {
+    typename Adaptive::Position desired;
+    for (int i = 0; i < 2; ++i) {
+      const bool given = reference != nullptr && !math::is_nan(reference[i]);
+      desired(i) = given ? reference[i] : filter_.x()(i);
+    }
+    return filter_.feedback(desired);
+  }
+
+  std::size_t run(const Record<Scalar>& record, const Columns<Scalar>& out, Report<Scalar>& last,
+                  Status& status) override {
+    status = Status::kOk;
+    for (std::size_t k = 0; k < record.rows; ++k) {
+      const Robust before = filter_;
+      const std::optional<Memory> remembered =
+          late() ? std::optional<Memory>(memory_) : std::nullopt;
+      Report<Scalar> report;
+      bool too_late = false;
+      status = take(record, k, report, too_late);
+      if (status != Status::kOk) {
+        static_cast<Robust&>(filter_) = before;
+        if (remembered) memory_ = *remembered;
+        return k;
+      }
+      write(k, record.width, report, too_late, out);
+      last = report;
+    }
+    return record.rows;
+  }
+
+  void x(Scalar* out) const override { copy(filter_.x(), out); }
+  void P(Scalar* out) const override { copy(filter_.P(), out); }
+  Scalar interval() const override { return filter_.interval(); }
+  const AnyInterval<Scalar>& policy() const override { return filter_.policy(); }
+
+  FilterState<Scalar> save() const override {
+    FilterState<Scalar> state;
+    append(filter_.x(), state.x);
+    append(filter_.P(), state.P);
+    append(filter_.process().input, state.input);
+    const auto& law = filter_.policy().mahalanobis.memory;
+    state.policy = {filter_.interval(),
+                    law.tau,
+                    law.interval,
+                    law.ratio,
+                    law.mahalanobis_squared,
+                    law.last_estimate(0),
+                    law.last_estimate(1),
+                    law.last_reference(0),
+                    law.last_reference(1)};
+    append_recovery(filter_, state.recovery);
+    if (!late()) return state;
+    append(memory_.base().x(), state.base);
+    append(memory_.base().P(), state.base);
+    append(memory_.base().process().input, state.base);
+    append_recovery(memory_.base(), state.base);
+    for (int k = 0; k < memory_.events().size(); ++k) {
+      const Event& event = memory_.events()[k];
+      state.events.push_back(event.dt);
+      append(event.input, state.events);
+      append(event.z, state.events);
+      state.events.push_back(Scalar(event.sensor.moved ? 1 : 0));
+      state.events.insert(state.events.end(), event.sensor.place, event.sensor.place + kMaxPlace);
+      state.sensors.push_back(event.is_update ? event.sensor.model : nullptr);
+    }
+    return state;
+  }
+
+  Status restore(const FilterState<Scalar>& state) override {
+    Adaptive filter = filter_;
+    const std::size_t base = N + N * N + kMaxInputs + 8;
+    if (state.x.size() != N || state.P.size() != N * N || state.input.size() != kMaxInputs ||
+        state.policy.size() != 9 || state.recovery.size() != 8 ||
+        state.base.size() != (late() ? base : 0) ||
+        state.events.size() != kEventNumbers * state.sensors.size()) {
+      return Status::kBadParameter;
+    }
+    AnyInterval<Scalar> policy = filter_.policy();
+    auto& law = policy.mahalanobis.memory;
+    const Scalar* p = state.policy.data();
+    law.tau = p[1];
+    law.interval = p[2];
+    law.ratio = p[3];
+    law.mahalanobis_squared = p[4];
+    for (int i = 0; i < 2; ++i) {
+      law.last_estimate(i) = p[5 + i];
+      law.last_reference(i) = p[7 + i];
+    }
+    Status status = restore_robust(filter, state.x.data(), state.P.data(), state.input.data(),
+                                   state.recovery.data());
+    if (status == Status::kOk) status = filter.restore(filter.belief(), policy, p[0]);
+    if (status != Status::kOk) return status;
+
+    Robust start = filter;
+    if (late()) {
+      const Scalar* b = state.base.data();
+      status = restore_robust(start, b, b + N, b + N + N * N, b + N + N * N + kMaxInputs);
+      if (status != Status::kOk) return status;
+    }
+    Events events(late_s_);
+    for (std::size_t k = 0; k < state.sensors.size(); ++k) {
+      events.insert(static_cast<int>(k), event(&state.events[k * kEventNumbers], state.sensors[k]));
+    }
+    filter_ = filter;
+    memory_ = Memory(start, events);
+    return Status::kOk;
+  }
+
+ private:
+  static Robust robust(const std::shared_ptr<const ProcessFor<Scalar, N>>& process,
+                       const Options& options) {
+    RuntimeProcess<Scalar, N> driven;
+    driven.model = process;
+    const AnyLinearisation<Scalar> how(options.kind, options.points, N);
+    return Robust(RuntimeGaussian<Scalar, N>(driven, how), options.rule);
+  }
+
+  bool late() const { return late_s_ > Scalar(0); }
+
+  Status take(const Record<Scalar>& record, std::size_t k, Report<Scalar>& report, bool& too_late) {
+    const Scalar* input = record.input;
+    if (input != nullptr) input += k * static_cast<std::size_t>(inputs());
+    Status status = predict(record.dt[k], input);
+    if (status != Status::kOk) return status;
+    const std::size_t which =
+        record.sensor != nullptr ? static_cast<std::size_t>(record.sensor[k]) : 0;
+    const auto& sensor = record.sensors[which];
+    const Scalar* z = record.z + k * record.width;
+    bool given = false;
+    for (int i = 0; i < sensor->size; ++i) given = given || !math::is_nan(z[i]);
+    if (given) {
+      const Scalar* place = record.place != nullptr ? record.place + k * kMaxPlace : nullptr;
+      if (place != nullptr && math::is_nan(place[0])) place = nullptr;
+      const Scalar age = record.age != nullptr ? record.age[k] : Scalar(0);
+      report = update(z, sensor, place, age);
+      too_late = report.status == Status::kTimeBackwards && age > Scalar(0);
+      if (too_late) report = Report<Scalar>();
+      if (report.status != Status::kOk) return report.status;
+    }
+    if (record.reference == nullptr) return Status::kOk;
+    return feedback(record.reference + k * 2);
+  }
+
+  void write(std::size_t k, std::size_t width, const Report<Scalar>& report, bool too_late,
+             const Columns<Scalar>& out) const {
+    copy(filter_.x(), out.x + k * N);
+    if (out.P != nullptr) copy(filter_.P(), out.P + k * N * N);
+    const std::size_t size = static_cast<std::size_t>(report.size);
+    const Scalar nan = std::numeric_limits<Scalar>::quiet_NaN();
+    for (std::size_t i = 0; i < width; ++i) {
+      const bool there = i < size;
+      out.innovation[k * width + i] = there ? report.innovation[i] : nan;
+      out.standardised[k * width + i] = there ? report.standardised[i] : nan;
+      out.weight[k * width + i] = there ? report.weight[i] : nan;
+      for (std::size_t j = 0; out.S != nullptr && j < width; ++j) {
+        out.S[(k * width + i) * width + j] = there && j < size ? report.S[i * size + j] : nan;
+      }
+    }
+    out.nis[k] = size > 0 ? report.nis : nan;
+    out.interval[k] = filter_.interval();
+    out.decision[k] = static_cast<std::uint8_t>(report.decision);
+    out.iterations[k] = report.iterations;
+    out.near_field[k] = report.near_field;
+    out.recovered[k] = report.recovered;
+    out.too_late[k] = too_late;
+  }
+
+  template <int Rows, int Cols>
+  static void copy(const Matrix<Scalar, Rows, Cols>& matrix, Scalar* out) {
+    for (int i = 0; i < Rows * Cols; ++i) out[i] = matrix.data()[i];
+  }
+  template <int Rows, int Cols>
+  static void append(const Matrix<Scalar, Rows, Cols>& matrix, std::vector<Scalar>& out) {
+    out.insert(out.end(), matrix.data(), matrix.data() + Rows * Cols);
+  }
+  static void append_recovery(const Robust& filter, std::vector<Scalar>& out) {
+    const auto& streak = filter.rule().recovery.streak;
+    out.push_back(Scalar(streak.count));
+    out.push_back(streak.variance);
+    append(streak.recent, out);
+  }
+
+  static Status restore_robust(Robust& filter, const Scalar* x, const Scalar* P,
+                               const Scalar* input, const Scalar* recovery) {
+    typename Robust::BeliefType belief;
+    for (int i = 0; i < N; ++i) belief.x(i) = x[i];
+    for (int i = 0; i < N * N; ++i) belief.P.data()[i] = P[i];
+    auto rule = filter.rule();
+    auto& streak = rule.recovery.streak;
+    const bool counts = recovery[0] >= Scalar(0) && recovery[0] <= Scalar(255);
+    if (!counts || !math::all_finite(input, kMaxInputs)) return Status::kBadParameter;
+    streak.count = static_cast<std::uint8_t>(recovery[0]);
+    streak.variance = recovery[1];
+    for (int i = 0; i < 6; ++i) streak.recent.data()[i] = recovery[2 + i];
+    const Status status = filter.restore(belief, rule);
+    if (status == Status::kOk) {
+      typename Event::Input values;
+      for (int i = 0; i < kMaxInputs; ++i) values(i) = input[i];
+      filter.drive(values);
+    }
+    return status;
+  }
+
+  static Event event(const Scalar* numbers,
+                     const std::shared_ptr<const AnySensor<Scalar>>& sensor) {
+    typename Event::Input input;
+    typename Event::Measurement z;
+    for (int i = 0; i < kMaxInputs; ++i) input(i) = numbers[1 + i];
+    for (int i = 0; i < kMaxSize; ++i) z(i) = numbers[1 + kMaxInputs + i];
+    if (sensor == nullptr) return Event(numbers[0], input);
+    const Scalar* rest = numbers + 1 + kMaxInputs + kMaxSize;
+    Sensor placed;
+    placed.model = std::static_pointer_cast<const SensorFor<Scalar, N>>(sensor);
+    placed.moved = rest[0] != Scalar(0);
+    for (int i = 0; i < kMaxPlace; ++i) placed.place[i] = rest[1 + i];
+    return Event(z, placed);
+  }
+
+  Adaptive filter_;
+  Scalar late_s_;
+  Memory memory_;
+};
+
+template <class Scalar, int N>
+std::unique_ptr<AnyFilter<Scalar>> ProcessFor<Scalar, N>::filter(
+    const std::shared_ptr<const AnyProcess<Scalar>>& self,
+    const FilterOptions<Scalar>& options) const {
+  const auto own = std::static_pointer_cast<const ProcessFor>(self);
+  std::unique_ptr<FilterFor<Scalar, N>> made(new FilterFor<Scalar, N>(own, options));
+  if (made->filter().check() != Status::kOk) return nullptr;
+  return std::unique_ptr<AnyFilter<Scalar>>(made.release());
+}
+
+}  // namespace desk
+}  // namespace auvest

@@ -1,0 +1,264 @@
+// Models behind an interface, so that filters, processes and sensors are put together at run time:
+// each model is compiled by itself, with the arithmetic of the core inlined, and not once per
+// combination.
+//
+// AnyProcess and AnySensor are what Python holds, whatever the number of states; ProcessFor and
+// SensorFor know it; ProcessOf and SensorOf wrap a model of the core or of a user.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "auvest/filters/robust.hpp"
+#include "auvest/runtime/any_kernel.hpp"
+#include "auvest/runtime/any_linearisation.hpp"
+#include "auvest/runtime/any_recovery.hpp"
+#include "desk/report.hpp"
+
+namespace auvest {
+namespace desk {
+
+template <class Scalar>
+class AnyFilter;
+template <class Scalar>
+struct FilterOptions;
+
+/// A process model, whatever its number of states.
+template <class Scalar>
+struct AnyProcess {
+  const int states;
+  const int inputs;
+
+  AnyProcess(int n, int u) : states(n), inputs(u) {}
+  virtual ~AnyProcess() = default;
+
+  /// The state (states) after dt seconds, the Jacobian and the noise covariance (states, states).
+  virtual void f(const Scalar* x, Scalar dt, const Scalar* input, Scalar* out) const = 0;
+  virtual void Phi(const Scalar* x, Scalar dt, const Scalar* input, Scalar* out) const = 0;
+  virtual void Q(Scalar dt, const Scalar* input, Scalar* out) const = 0;
+
+  /// A filter of this process; needs reset() next. Null where the options are out of range.
+  virtual std::unique_ptr<AnyFilter<Scalar>> filter(const std::shared_ptr<const AnyProcess>& self,
+                                                    const FilterOptions<Scalar>& options) const = 0;
+};
+
+/// A measurement model, whatever the number of states it is for.
+template <class Scalar>
+struct AnySensor {
+  const int states;
+  const int size;
+  const int place;          ///< coordinates that say where it stands; 0: it has no place
+  std::string description;  ///< how its owner would make it again
+
+  AnySensor(int n, int m, int p) : states(n), size(m), place(p) {}
+  virtual ~AnySensor() = default;
+  /// Measurements (rows, size) of states (rows, states) without noise.
+  virtual void measure(const Scalar* x, Scalar* z, std::size_t rows) const = 0;
+};
+
+template <class Scalar, int N>
+struct ProcessFor : AnyProcess<Scalar> {
+  using Input = Vector<Scalar, kMaxInputs>;
+
+  explicit ProcessFor(int u) : AnyProcess<Scalar>(N, u) {}
+  std::unique_ptr<AnyFilter<Scalar>> filter(const std::shared_ptr<const AnyProcess<Scalar>>& self,
+                                            const FilterOptions<Scalar>& options) const override;
+
+  virtual Status predict(const AnyLinearisation<Scalar>& how, Belief<Scalar, N>& belief, Scalar dt,
+                         const Input& input) const = 0;
+  virtual Scalar position_variance(const Belief<Scalar, N>& belief, Scalar dt,
+                                   const Input& input) const = 0;
+};
+
+/// The process of a filter: the model and what drives it.
+template <class Scalar_, int N>
+struct RuntimeProcess {
+  using Scalar = Scalar_;
+  using Input = Vector<Scalar, kMaxInputs>;
+  static constexpr int kStates = N;
+
+  std::shared_ptr<const ProcessFor<Scalar, N>> model;
+  Input input = Input::Zero();
+
+  Scalar position_variance(const Belief<Scalar, N>& belief, Scalar dt) const {
+    return model->position_variance(belief, dt, input);
+  }
+};
+
+/// A Gaussian filter whose process and whose linearisation are chosen at run time.
+template <class Scalar_, int N>
+class RuntimeGaussian
+    : public GaussianFilter<RuntimeGaussian<Scalar_, N>, RuntimeProcess<Scalar_, N>> {
+ public:
+  using Scalar = Scalar_;
+  using Base = GaussianFilter<RuntimeGaussian<Scalar, N>, RuntimeProcess<Scalar, N>>;
+  using typename Base::BeliefType;
+
+  RuntimeGaussian(const RuntimeProcess<Scalar, N>& process, const AnyLinearisation<Scalar>& how)
+      : Base(process, how.check()), how_(how) {}
+
+  Status predict_belief(BeliefType& belief, Scalar dt) const {
+    return this->process().model->predict(how_, belief, dt, this->process().input);
+  }
+
+  template <class Model, class Point>
+  Status linearise(const Model& model, const Point& point,
+                   const Matrix<Scalar, Model::kObserved, Model::kObserved>& root,
+                   const typename Model::Measurement& z, typename Model::Measurement& innovation,
+                   Matrix<Scalar, Model::kSize, Model::kObserved>& a,
+                   typename Model::Noise& noise) const {
+    return how_.linearise(model, point, root, z, innovation, a, noise);
+  }
+
+ private:
+  AnyLinearisation<Scalar> how_;
+};
+
+template <class Scalar, int N>
+struct PlacedSensor;
+
+/// The same with any kernel and recovery, and with sensors that are chosen at run time.
+template <class Scalar_, int N>
+class RuntimeRobust : public Robust<RuntimeGaussian<Scalar_, N>,
+                                    RobustUpdate<AnyKernel<Scalar_>, AnyRecovery<Scalar_>>> {
+ public:
+  using Scalar = Scalar_;
+  using Base =
+      Robust<RuntimeGaussian<Scalar, N>, RobustUpdate<AnyKernel<Scalar>, AnyRecovery<Scalar>>>;
+  using Base::Base;
+  using Base::update;
+
+  Report<Scalar> update(const Vector<Scalar, kMaxSize>& z, const PlacedSensor<Scalar, N>& sensor) {
+    return sensor.model->update(*this, z, sensor);
+  }
+};
+
+template <class Scalar, int N>
+struct SensorFor : AnySensor<Scalar> {
+  using AnySensor<Scalar>::AnySensor;
+  virtual Report<Scalar> update(RuntimeRobust<Scalar, N>& filter, const Vector<Scalar, kMaxSize>& z,
+                                const PlacedSensor<Scalar, N>& placed) const = 0;
+};
+
+/// A sensor and where it stood.
+template <class Scalar, int N>
+struct PlacedSensor {
+  using Measurement = Vector<Scalar, kMaxSize>;
+
+  std::shared_ptr<const SensorFor<Scalar, N>> model;
+  bool moved = false;  ///< to `place`; else the model's own place counts
+  Scalar place[kMaxPlace] = {};
+};
+
+/// Size of a process's input, 0 if it has none.
+template <class Process>
+constexpr auto input_size(int) -> decltype(Process::Input::RowsAtCompileTime, 0) {
+  return Process::Input::RowsAtCompileTime;
+}
+template <class Process>
+constexpr int input_size(long) {
+  return 0;
+}
+
+template <class Process>
+class ProcessOf final : public ProcessFor<typename Process::Scalar, Process::kStates> {
+ public:
+  using Scalar = typename Process::Scalar;
+  static constexpr int kStates = Process::kStates;
+  static constexpr int kInputs = input_size<Process>(0);
+  static_assert(kInputs <= kMaxInputs, "a process is driven by at most 8 numbers");
+  using Base = ProcessFor<Scalar, kStates>;
+  using typename Base::Input;
+
+  explicit ProcessOf(const Process& process) : Base(kInputs), process_(process) {}
+
+  const Process& process() const { return process_; }
+
+  Status predict(const AnyLinearisation<Scalar>& how, Belief<Scalar, kStates>& belief, Scalar dt,
+                 const Input& input) const override {
+    return how.predict(driven(input, Inputs<kInputs>()), belief, dt);
+  }
+  Scalar position_variance(const Belief<Scalar, kStates>& belief, Scalar dt,
+                           const Input& input) const override {
+    return driven(input, Inputs<kInputs>()).position_variance(belief, dt);
+  }
+
+  void f(const Scalar* x, Scalar dt, const Scalar* input, Scalar* out) const override {
+    copy(driven(to_input(input), Inputs<kInputs>()).f(to_state(x), dt), out);
+  }
+  void Phi(const Scalar* x, Scalar dt, const Scalar* input, Scalar* out) const override {
+    copy(driven(to_input(input), Inputs<kInputs>()).Phi(to_state(x), dt), out);
+  }
+  void Q(Scalar dt, const Scalar* input, Scalar* out) const override {
+    copy(driven(to_input(input), Inputs<kInputs>()).Q(dt), out);
+  }
+
+ private:
+  template <int>
+  struct Inputs {};
+
+  static Input to_input(const Scalar* values) {
+    Input input = Input::Zero();
+    for (int i = 0; i < kInputs; ++i) input(i) = values[i];
+    return input;
+  }
+  static typename Process::State to_state(const Scalar* values) {
+    typename Process::State x;
+    for (int i = 0; i < kStates; ++i) x(i) = values[i];
+    return x;
+  }
+  template <int Rows, int Cols>
+  static void copy(const Matrix<Scalar, Rows, Cols>& matrix, Scalar* out) {
+    for (int i = 0; i < Rows * Cols; ++i) out[i] = matrix.data()[i];
+  }
+
+  const Process& driven(const Input&, Inputs<0>) const { return process_; }
+  template <int U>
+  Process driven(const Input& input, Inputs<U>) const {
+    Process process = process_;
+    for (int i = 0; i < U; ++i) process.input(i) = input(i);
+    return process;
+  }
+
+  Process process_;
+};
+
+template <class Model>
+class SensorOf final : public SensorFor<typename Model::Scalar, Model::kStates> {
+ public:
+  using Scalar = typename Model::Scalar;
+  static constexpr int kStates = Model::kStates;
+  static constexpr int kSize = Model::kSize;
+  static_assert(kSize <= kMaxSize, "a measurement has at most 6 numbers");
+  static_assert(Model::kPlace <= kMaxPlace, "a place has at most 3 coordinates");
+  using Base = SensorFor<Scalar, kStates>;
+
+  explicit SensorOf(const Model& model) : Base(kStates, kSize, Model::kPlace), model_(model) {}
+
+  const Model& model() const { return model_; }
+
+  Report<Scalar> update(RuntimeRobust<Scalar, kStates>& filter, const Vector<Scalar, kMaxSize>& z,
+                        const PlacedSensor<Scalar, kStates>& placed) const override {
+    typename Model::Measurement value;
+    for (int i = 0; i < kSize; ++i) value(i) = z(i);
+    if (!placed.moved) return Report<Scalar>(filter.update(value, model_));
+    Model there = model_;
+    there.place(placed.place);
+    return Report<Scalar>(filter.update(value, there));
+  }
+
+  void measure(const Scalar* x, Scalar* z, std::size_t rows) const override {
+    for (std::size_t k = 0; k < rows; ++k) {
+      typename Model::State state;
+      for (int i = 0; i < kStates; ++i) state(i) = x[k * kStates + static_cast<std::size_t>(i)];
+      const typename Model::Measurement value = model_.h(state);
+      for (int i = 0; i < kSize; ++i) z[k * kSize + static_cast<std::size_t>(i)] = value(i);
+    }
+  }
+
+ private:
+  Model model_;
+};
+
+}  // namespace desk
+}  // namespace auvest

@@ -1,0 +1,47 @@
+// How a Gaussian filter linearises, chosen at run time: the EKF's Jacobians or a UKF's points.
+#pragma once
+
+#include <cstdint>
+
+#include "auvest/filters/ekf.hpp"
+#include "auvest/filters/ukf.hpp"
+
+namespace auvest {
+
+template <class Scalar_>
+struct AnyLinearisation {
+  using Scalar = Scalar_;
+  enum class Kind : std::uint8_t { kEkf, kUkf };
+
+  Kind kind;
+  SigmaPoints<Scalar> unscented;
+
+  AnyLinearisation(Kind k, const typename SigmaPoints<Scalar>::Params& params, int states)
+      : kind(k), unscented(params, states) {}
+
+  Status check() const { return kind == Kind::kUkf ? unscented.status : Status::kOk; }
+
+  template <class Process, int N>
+  Status predict(const Process& process, Belief<Scalar, N>& belief, Scalar dt) const {
+    if (kind == Kind::kUkf) {
+      return predict_by_points(unscented, process, belief, dt, IsLinear<Process::kLinear>());
+    }
+    process.propagate(belief, dt);
+    return Status::kOk;
+  }
+
+  template <class Model, class Point>
+  Status linearise(const Model& model, const Point& point,
+                   const Matrix<Scalar, Model::kObserved, Model::kObserved>& root,
+                   const typename Model::Measurement& z, typename Model::Measurement& innovation,
+                   Matrix<Scalar, Model::kSize, Model::kObserved>& a,
+                   typename Model::Noise& noise) const {
+    if (kind == Kind::kUkf) {
+      return linearise_by_points(unscented, model, point, root, z, innovation, a, noise);
+    }
+    linearise_by_jacobian(model, point, root, z, innovation, a, noise);
+    return Status::kOk;
+  }
+};
+
+}  // namespace auvest
