@@ -137,10 +137,11 @@ build-release: setup-dev
 # ---- Measure -------------------------------------------------------------------------------------
 
 .PHONY: bench math-accuracy
-bench: build-release install-editable ## instructions and time per step, beside filterpy, NumPy, Numba
+bench: build-release install-editable ## time per step beside filterpy, NumPy, Numba; time to start
 	$(PY) cpp/benchmarks/speed.py build/release/cpp/benchmarks/ukf_step --write docs/speed.md
 	OPENBLAS_NUM_THREADS=1 $(PY) cpp/benchmarks/slat_speed.py \
 	    build/release/cpp/benchmarks --write docs/speed_slat.md
+	$(PY) cpp/benchmarks/startup.py --write docs/speed_startup.md
 
 math-accuracy: build-release ## errors of the float functions over all 2^32 arguments
 	build/release/cpp/tools/math_accuracy

@@ -2,89 +2,124 @@
 
 The same C++ filters run here, on a Cortex-M and on an ATmega2560, in float32 with the same bits.
 SI units, angles in rad; bearings from +x towards +y.
+
+Every name is imported when it is first used: neither ``import auvest`` nor ``auvest --help`` waits
+for NumPy. To add a name: a line for type checkers and one for Python, both sorted.
 """
 
 from __future__ import annotations
 
-from auvest import metrics, montecarlo, scenarios
-from auvest._core import Decision, SelfTestPart, SelfTestResult, Status, self_test
-from auvest.commands.version import version
-from auvest.errors import FilterError
-from auvest.filters import Aukf, Ekf, RunResult, Ukf
-from auvest.intervals import CovarianceBudget, FixedInterval, MahalanobisInterval
-from auvest.kernels import Hampel, Huber, Igg, RejectionStreak, Unit
-from auvest.models import (
-    ConstantAcceleration,
-    LeaderRange,
-    Odometry,
-    RangeBearing,
-    SpeedHeading,
-)
-from auvest.robust_filters import RobustEkf, RobustReport, RobustRunResult, RobustUkf
-from auvest.slat import (
-    UNKNOWN_MASTER,
-    DeadReckoning,
-    EkfSlat,
-    Outage,
-    Slatf,
-    SlatfJoint,
-    SlatRun,
-)
-from auvest.slat_models import (
-    CompassMotion,
-    ConstantVelocity,
-    CoordinatedTurn,
-    Imm,
-    PiecewiseAcceleration,
-    Sonar,
-    UnicycleMotion,
-)
+from typing import TYPE_CHECKING
 
-__all__ = [
-    "UNKNOWN_MASTER",
-    "Aukf",
-    "CompassMotion",
-    "ConstantAcceleration",
-    "ConstantVelocity",
-    "CoordinatedTurn",
-    "CovarianceBudget",
-    "DeadReckoning",
-    "Decision",
-    "Ekf",
-    "EkfSlat",
-    "FilterError",
-    "FixedInterval",
-    "Hampel",
-    "Huber",
-    "Igg",
-    "Imm",
-    "LeaderRange",
-    "MahalanobisInterval",
-    "Odometry",
-    "Outage",
-    "PiecewiseAcceleration",
-    "RangeBearing",
-    "RejectionStreak",
-    "RobustEkf",
-    "RobustReport",
-    "RobustRunResult",
-    "RobustUkf",
-    "RunResult",
-    "SelfTestPart",
-    "SelfTestResult",
-    "SlatRun",
-    "Slatf",
-    "SlatfJoint",
-    "Sonar",
-    "SpeedHeading",
-    "Status",
-    "Ukf",
-    "UnicycleMotion",
-    "Unit",
-    "metrics",
-    "montecarlo",
-    "scenarios",
-    "self_test",
-]
+if TYPE_CHECKING:
+    from auvest import metrics as metrics
+    from auvest import montecarlo as montecarlo
+    from auvest import scenarios as scenarios
+    from auvest._core import Decision as Decision
+    from auvest._core import SelfTestPart as SelfTestPart
+    from auvest._core import SelfTestResult as SelfTestResult
+    from auvest._core import Status as Status
+    from auvest._core import self_test as self_test
+    from auvest.errors import FilterError as FilterError
+    from auvest.filters import Aukf as Aukf
+    from auvest.filters import Ekf as Ekf
+    from auvest.filters import RunResult as RunResult
+    from auvest.filters import Ukf as Ukf
+    from auvest.intervals import CovarianceBudget as CovarianceBudget
+    from auvest.intervals import FixedInterval as FixedInterval
+    from auvest.intervals import MahalanobisInterval as MahalanobisInterval
+    from auvest.kernels import Hampel as Hampel
+    from auvest.kernels import Huber as Huber
+    from auvest.kernels import Igg as Igg
+    from auvest.kernels import RejectionStreak as RejectionStreak
+    from auvest.kernels import Unit as Unit
+    from auvest.models import ConstantAcceleration as ConstantAcceleration
+    from auvest.models import LeaderRange as LeaderRange
+    from auvest.models import Odometry as Odometry
+    from auvest.models import RangeBearing as RangeBearing
+    from auvest.models import SpeedHeading as SpeedHeading
+    from auvest.robust_filters import RobustEkf as RobustEkf
+    from auvest.robust_filters import RobustReport as RobustReport
+    from auvest.robust_filters import RobustRunResult as RobustRunResult
+    from auvest.robust_filters import RobustUkf as RobustUkf
+    from auvest.slat import UNKNOWN_MASTER as UNKNOWN_MASTER
+    from auvest.slat import DeadReckoning as DeadReckoning
+    from auvest.slat import EkfSlat as EkfSlat
+    from auvest.slat import Outage as Outage
+    from auvest.slat import Slatf as Slatf
+    from auvest.slat import SlatfJoint as SlatfJoint
+    from auvest.slat import SlatRun as SlatRun
+    from auvest.slat_models import CompassMotion as CompassMotion
+    from auvest.slat_models import ConstantVelocity as ConstantVelocity
+    from auvest.slat_models import CoordinatedTurn as CoordinatedTurn
+    from auvest.slat_models import Imm as Imm
+    from auvest.slat_models import PiecewiseAcceleration as PiecewiseAcceleration
+    from auvest.slat_models import Sonar as Sonar
+    from auvest.slat_models import UnicycleMotion as UnicycleMotion
 
-__version__ = version()
+    __version__: str
+else:
+    from importlib import import_module
+
+    _SUBMODULES = ("metrics", "montecarlo", "scenarios")
+    _HOME = {
+        "Aukf": "filters",
+        "CompassMotion": "slat_models",
+        "ConstantAcceleration": "models",
+        "ConstantVelocity": "slat_models",
+        "CoordinatedTurn": "slat_models",
+        "CovarianceBudget": "intervals",
+        "DeadReckoning": "slat",
+        "Decision": "_core",
+        "Ekf": "filters",
+        "EkfSlat": "slat",
+        "FilterError": "errors",
+        "FixedInterval": "intervals",
+        "Hampel": "kernels",
+        "Huber": "kernels",
+        "Igg": "kernels",
+        "Imm": "slat_models",
+        "LeaderRange": "models",
+        "MahalanobisInterval": "intervals",
+        "Odometry": "models",
+        "Outage": "slat",
+        "PiecewiseAcceleration": "slat_models",
+        "RangeBearing": "models",
+        "RejectionStreak": "kernels",
+        "RobustEkf": "robust_filters",
+        "RobustReport": "robust_filters",
+        "RobustRunResult": "robust_filters",
+        "RobustUkf": "robust_filters",
+        "RunResult": "filters",
+        "SelfTestPart": "_core",
+        "SelfTestResult": "_core",
+        "SlatRun": "slat",
+        "Slatf": "slat",
+        "SlatfJoint": "slat",
+        "Sonar": "slat_models",
+        "SpeedHeading": "models",
+        "Status": "_core",
+        "UNKNOWN_MASTER": "slat",
+        "Ukf": "filters",
+        "UnicycleMotion": "slat_models",
+        "Unit": "kernels",
+        "self_test": "_core",
+    }
+    __all__ = sorted([*_HOME, *_SUBMODULES])
+
+    def __getattr__(name):
+        if name in _HOME:
+            value = getattr(import_module(f"auvest.{_HOME[name]}"), name)
+        elif name in _SUBMODULES:
+            value = import_module(f"auvest.{name}")
+        elif name == "__version__":
+            from auvest.commands.version import version
+
+            value = version()
+        else:
+            raise AttributeError(f"module 'auvest' has no attribute {name!r}")
+        globals()[name] = value  # so that the next use does not come here
+        return value
+
+    def __dir__():
+        return sorted({*globals(), *__all__, "__version__"})

@@ -1,40 +1,76 @@
 """The command line ``auvest``: the tree of commands. Each command is a module of its own.
 
 To add one: write ``commands/<verb>_<noun>.py`` with a function ``command`` and its ``HELP``, and
-register it below.
+put it into the table below with the line that stands first in its help and in that of its group.
+The module is imported when the command is called: ``auvest --help`` waits for none of them.
 """
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Mapping
+from importlib import import_module
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
-from auvest.commands import (
-    capture,
-    import_log,
-    replay,
-    reproduce_aukf,
-    reproduce_intervals,
-    reproduce_logs,
-    reproduce_mekf,
-    reproduce_mrclam6,
-    reproduce_slatf,
-    simulate_aukf,
-    simulate_mekf,
-    simulate_slatf,
-)
-from auvest.commands.console import EXIT_CODES
-from auvest.commands.version import version
+from auvest.commands.exit_codes import EXIT_CODES
 
-_CONTEXT = {"help_option_names": ["-h", "--help"]}
+#: Module and first line of help of each command, by the words that call it.
+COMMANDS: Mapping[tuple[str, ...], tuple[str, str]] = {
+    ("capture",): (
+        "commands.capture",
+        "Record what the sketch tracking_loop reports: a CSV file, a figure, a table.",
+    ),
+    ("import",): (
+        "commands.import_log",
+        "Turn a published recording into logs for 'auvest replay'.",
+    ),
+    ("replay",): ("commands.replay", "Replay recorded runs through a filter."),
+    ("simulate", "aukf"): (
+        "commands.simulate_aukf",
+        "Simulate the AUKF paper's scenario and show errors, intervals and consistency.",
+    ),
+    ("simulate", "slatf"): (
+        "commands.simulate_slatf",
+        "Simulate the SLATF paper's scenario and show errors and consistency.",
+    ),
+    ("simulate", "mekf"): (
+        "commands.simulate_mekf",
+        "Simulate range-only cooperative localisation and show errors, weights and consistency.",
+    ),
+    ("reproduce", "aukf"): (
+        "commands.reproduce_aukf",
+        "Reproduce the AUKF paper (Deng, Yin, Duan 2019): Figs 1 to 10 and every claim.",
+    ),
+    ("reproduce", "slatf"): (
+        "commands.reproduce_slatf",
+        "Reproduce the SLATF paper (Lu, Chen, Liu, Ma, He 2020): Table 1, Figs 2 to 6, all claims.",
+    ),
+    ("reproduce", "mekf"): (
+        "commands.reproduce_mekf",
+        "Reproduce the M-estimation EKF paper (Li, Du, Fan, Chen, Mao, Luo 2020): Figs 5 and 6.",
+    ),
+    ("reproduce", "intervals"): (
+        "commands.reproduce_intervals",
+        "Compare the interval policies at equal mean sampling rate.",
+    ),
+    ("reproduce", "logs"): (
+        "commands.reproduce_logs",
+        "Replay the validation recordings and set the errors beside the targets.",
+    ),
+    ("reproduce", "mrclam6"): (
+        "commands.reproduce_mrclam6",
+        "Track real robots that see each other, with one setting for all tracks.",
+    ),
+}
 
 app = typer.Typer(
     name="auvest",
     no_args_is_help=True,
     rich_markup_mode="rich",
     pretty_exceptions_show_locals=False,
-    context_settings=_CONTEXT,
+    context_settings={"help_option_names": ["-h", "--help"]},
     help=f"""Estimators for small autonomous underwater vehicles: simulate, reproduce, compare.
 
 Results go to stdout, messages and progress to stderr; --json gives one JSON object on stdout.
@@ -68,32 +104,42 @@ First steps:
 {EXIT_CODES}
 """,
 )
+_GROUPS = {
+    "simulate": "Simulate a filter in its scenario, many runs.",
+    "reproduce": "Reproduce a paper's figures and judge its claims.",
+}
 
-simulate = typer.Typer(
-    no_args_is_help=True, help="Simulate a filter in its scenario, many runs.", name="simulate"
-)
-reproduce = typer.Typer(
-    no_args_is_help=True, help="Reproduce a paper's figures and judge its claims.", name="reproduce"
-)
-app.add_typer(simulate)
-app.add_typer(reproduce)
 
-app.command("capture", help=capture.HELP)(capture.command)
-app.command("import", help=import_log.HELP)(import_log.command)
-app.command("replay", help=replay.HELP)(replay.command)
-simulate.command("aukf", help=simulate_aukf.HELP)(simulate_aukf.command)
-reproduce.command("aukf", help=reproduce_aukf.HELP)(reproduce_aukf.command)
-simulate.command("slatf", help=simulate_slatf.HELP)(simulate_slatf.command)
-reproduce.command("slatf", help=reproduce_slatf.HELP)(reproduce_slatf.command)
-simulate.command("mekf", help=simulate_mekf.HELP)(simulate_mekf.command)
-reproduce.command("mekf", help=reproduce_mekf.HELP)(reproduce_mekf.command)
-reproduce.command("intervals", help=reproduce_intervals.HELP)(reproduce_intervals.command)
-reproduce.command("logs", help=reproduce_logs.HELP)(reproduce_logs.command)
-reproduce.command("mrclam6", help=reproduce_mrclam6.HELP)(reproduce_mrclam6.command)
+def _lazy(module: str, line: str) -> type[TyperCommand]:
+    """Make what stands in the tree of commands until the command is called."""
+
+    class Lazy(TyperCommand):
+        def make_context(self, *arguments: Any, **options: Any) -> Any:
+            found = import_module(f"auvest.{module}")
+            real = typer.Typer(rich_markup_mode="rich", add_completion=False)
+            text = f"{line}\n\n{found.HELP}\n{EXIT_CODES}\n"
+            real.command(self.name, help=text)(found.command)
+            return typer.main.get_command(real).make_context(*arguments, **options)
+
+    return Lazy
+
+
+def _grow() -> None:
+    branches: dict[tuple[str, ...], typer.Typer] = {(): app}
+    for name, text in _GROUPS.items():
+        branches[(name,)] = typer.Typer(name=name, no_args_is_help=True, help=text)
+        app.add_typer(branches[(name,)])
+    for (*group, name), (module, line) in COMMANDS.items():
+        branches[tuple(group)].command(name, cls=_lazy(module, line), help=line)(lambda: None)
+
+
+_grow()
 
 
 def _show_version(wanted: bool) -> None:
     if wanted:
+        from auvest.commands.version import version
+
         typer.echo(f"auvest {version()}")
         raise typer.Exit
 

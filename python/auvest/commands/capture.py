@@ -17,7 +17,8 @@ from rich.table import Table
 from auvest import MahalanobisInterval, RangeBearing, metrics, telemetry
 from auvest.board import Board, BoardError, Finished, PinChange, SerialLine
 from auvest.commands import options
-from auvest.commands.console import EXIT_CODES, ExitCode, Terminal
+from auvest.commands.console import Terminal
+from auvest.commands.exit_codes import ExitCode
 from auvest.commands.files import write_results
 from auvest.commands.options import WORLD, refuse_given
 from auvest.commands.version import version
@@ -34,8 +35,7 @@ TRIGGER_PIN = "PORTH5"
 SILENCE_S = 10.0
 SOUND_M_S = 1500.0
 
-HELP = f"""Record what the sketch tracking_loop reports: a CSV file, a figure, a table.
-
+HELP = """\
 The sketch runs on an Arduino at --port, or on a simulated one with --simulator, where the vehicle \
 and its sonar are simulated too. --play-sonar simulates them for a board that has no sonar. \
 Every sample is in the CSV file as soon as it has come, with all the bits of its floats; Ctrl-C \
@@ -50,8 +50,6 @@ Examples:
   auvest capture --port /dev/ttyACM0 --output dive-7
 
   auvest capture --port /dev/ttyACM0 --play-sonar --steps 60
-
-{EXIT_CODES}
 """
 
 _NOISE = paper_aukf.paper_noise()

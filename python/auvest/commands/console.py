@@ -10,7 +10,6 @@ import json
 import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from enum import IntEnum
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -19,23 +18,10 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from auvest.commands.exit_codes import ExitCode
+
 #: ``progress(done, total)``, called now and then by long work.
 ProgressCallback = Callable[[int, int], None]
-
-
-class ExitCode(IntEnum):
-    """What the shell sees."""
-
-    OK = 0
-    FAILED = 1
-    USAGE = 2
-    INTERRUPTED = 130
-
-
-EXIT_CODES = (
-    "Exit codes: 0 done; 1 a run failed or a file could not be written; 2 wrong usage; "
-    "130 interrupted (what was done is kept)."
-)
 
 
 class Terminal:

@@ -8,12 +8,11 @@ from typing import Annotated, Literal
 import typer
 
 from auvest.commands import options
-from auvest.commands.console import EXIT_CODES, Terminal
+from auvest.commands.console import Terminal
 from auvest.commands.version import version
 from auvest.logs.importers import IMPORTERS
 
-HELP = f"""Turn a published recording into logs for 'auvest replay'.
-
+HELP = """\
 Knows goats14, hat_charles, labyrinth_uwb, mrclam6 and ugps_pier59 as the project's validation data
 have them, and mrclam: the original text files of any UTIAS MR.CLAM set. What is taken from each is
 said in docs/logs.md.
@@ -23,8 +22,6 @@ Examples:
   auvest import goats14 data/goats14 logs
 
   auvest import mrclam MRCLAM_Dataset6 logs/mrclam6
-
-{EXIT_CODES}
 """
 
 SetName = Literal["goats14", "hat_charles", "labyrinth_uwb", "mrclam6", "mrclam", "ugps_pier59"]

@@ -9,7 +9,8 @@ import typer
 from rich.table import Table
 
 from auvest.commands import console, options
-from auvest.commands.console import EXIT_CODES, ExitCode, Terminal
+from auvest.commands.console import Terminal
+from auvest.commands.exit_codes import ExitCode
 from auvest.commands.version import version
 from auvest.errors import FilterError
 from auvest.logs import LogFolder
@@ -17,8 +18,7 @@ from auvest.replay import Result, Settings, find_settings
 from auvest.replay import replay as run_replay
 from auvest.replay.config import FilterName, packaged_settings
 
-HELP = f"""Replay recorded runs through a filter.
-
+HELP = """\
 A LOG is a folder of CSV files, as docs/logs.md describes it and 'auvest import' makes it. For each
 the output folder gets a folder with the estimates, measurements and errors as CSV and Parquet, the
 track as TUM text, a figure, one self-contained HTML report and results.json.
@@ -30,8 +30,6 @@ Examples:
   auvest replay logs/goats14 --config goats14
 
   auvest replay logs/robot* --filter ekf --json --quiet | jq '.logs[].rmse_m'
-
-{EXIT_CODES}
 """
 
 

@@ -7,14 +7,14 @@ from pathlib import Path
 from rich.table import Table
 
 from auvest.commands import console, options
-from auvest.commands.console import EXIT_CODES, ExitCode, Terminal
+from auvest.commands.console import Terminal
+from auvest.commands.exit_codes import ExitCode
 from auvest.commands.files import save_figures, write_page
 from auvest.commands.version import version
 from auvest.reproduce import aukf, aukf_page
 from auvest.reproduce.claims import Claim
 
-HELP = f"""Reproduce the AUKF paper (Deng, Yin, Duan 2019): Figs 1 to 10 and every claim.
-
+HELP = """\
 Writes each figure as PNG and CSV, a page README.md that sets the paper's figures and claims beside
 what was measured, with all assumptions and contradictions, and results.json.
 
@@ -25,8 +25,6 @@ Examples:
   auvest reproduce aukf --runs 40 --output results
 
   auvest reproduce aukf --json --quiet | jq .figure3.interval_s
-
-{EXIT_CODES}
 """
 
 

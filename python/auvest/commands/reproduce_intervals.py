@@ -7,12 +7,12 @@ from pathlib import Path
 from rich.table import Table
 
 from auvest.commands import console, options
-from auvest.commands.console import EXIT_CODES, ExitCode, Terminal
+from auvest.commands.console import Terminal
+from auvest.commands.exit_codes import ExitCode
 from auvest.commands.version import version
 from auvest.reproduce import intervals
 
-HELP = f"""Compare the interval policies at equal mean sampling rate.
-
+HELP = """\
 For near and far, straight and turning tracks and three noises: RMSE and time above the error budget
 of the covariance budget, the fixed interval and the paper's law. Writes a page README.md, a picture
 and results.json.
@@ -22,8 +22,6 @@ Examples:
   auvest reproduce intervals
 
   auvest reproduce intervals --runs 50 --json --quiet | jq '.cases[0]'
-
-{EXIT_CODES}
 """
 
 

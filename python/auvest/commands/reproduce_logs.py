@@ -9,12 +9,12 @@ import typer
 from rich.table import Table
 
 from auvest.commands import console, options
-from auvest.commands.console import EXIT_CODES, ExitCode, Terminal
+from auvest.commands.console import Terminal
+from auvest.commands.exit_codes import ExitCode
 from auvest.commands.version import version
 from auvest.reproduce import logs
 
-HELP = f"""Replay the validation recordings and set the errors beside the targets.
-
+HELP = """\
 Needs the recordings, which are not part of the package: the folder with goats14, hat_charles,
 mrclam6, labyrinth_uwb and ugps_pier59. Writes a page README.md and results.json.
 
@@ -23,8 +23,6 @@ Examples:
   auvest reproduce logs --data ../shared/data
 
   AUVEST_DATA=../shared/data auvest reproduce logs --json --quiet | jq .held
-
-{EXIT_CODES}
 """
 
 

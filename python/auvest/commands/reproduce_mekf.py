@@ -9,13 +9,13 @@ import typer
 from rich.table import Table
 
 from auvest.commands import console, options
-from auvest.commands.console import EXIT_CODES, ExitCode, Terminal
+from auvest.commands.console import Terminal
+from auvest.commands.exit_codes import ExitCode
 from auvest.commands.files import save_figures, write_page
 from auvest.commands.version import version
 from auvest.reproduce import mekf, mekf_page
 
-HELP = f"""Reproduce the M-estimation EKF paper (Li, Du, Fan, Chen, Mao, Luo 2020): Figs 5 and 6.
-
+HELP = """\
 Range-only cooperative localisation with outliers: EKF, IGG, Huber and Hampel over contamination,
 message timing and kinds of noise; consistency; lock-out. Writes the figures as PNG and CSV, a page
 README.md and results.json.
@@ -27,8 +27,6 @@ Examples:
   auvest reproduce mekf --runs 10 --output results
 
   auvest reproduce mekf --json --quiet | jq .contamination
-
-{EXIT_CODES}
 """
 
 

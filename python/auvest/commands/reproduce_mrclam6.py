@@ -9,12 +9,12 @@ import typer
 from rich.table import Table
 
 from auvest.commands import console, options
-from auvest.commands.console import EXIT_CODES, ExitCode, Terminal
+from auvest.commands.console import Terminal
+from auvest.commands.exit_codes import ExitCode
 from auvest.commands.version import version
 from auvest.reproduce import mrclam6
 
-HELP = f"""Track real robots that see each other, with one setting for all tracks.
-
+HELP = """\
 Each track of the UTIAS recording (one robot seen by another for at least 15 s) is run through dead
 reckoning, EKF-SLAT and SLATF 2.0 with an IMM master of unknown velocity. Writes a page README.md, a
 picture and results.json. The recording is not part of auvest: DIR/mrclam6 holds groundtruth.csv,
@@ -25,8 +25,6 @@ Examples:
   auvest reproduce mrclam6 --data recordings
 
   AUVEST_DATA=recordings auvest reproduce mrclam6 --json --quiet | jq '.filters'
-
-{EXIT_CODES}
 """
 
 

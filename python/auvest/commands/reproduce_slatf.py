@@ -9,15 +9,15 @@ import typer
 from rich.table import Table
 
 from auvest.commands import console, options
-from auvest.commands.console import EXIT_CODES, ExitCode, Terminal
+from auvest.commands.console import Terminal
+from auvest.commands.exit_codes import ExitCode
 from auvest.commands.files import save_figures, write_page
 from auvest.commands.version import version
 from auvest.reproduce import slatf, slatf_page
 from auvest.scenarios.paper_aukf import DTypeName
 from auvest.scenarios.paper_slatf import FILTERS, FilterName
 
-HELP = f"""Reproduce the SLATF paper (Lu, Chen, Liu, Ma, He 2020): Table 1, Figs 2 to 6, all claims.
-
+HELP = """\
 Writes each figure as PNG and CSV, a page README.md that sets the paper's table, figures and claims
 beside what was measured, with all assumptions, and results.json.
 
@@ -28,8 +28,6 @@ Examples:
   auvest reproduce slatf --runs 200 --output results
 
   auvest reproduce slatf --json --quiet | jq '.table1[] | [.level, .slatf1, .slatf2]'
-
-{EXIT_CODES}
 """
 
 

@@ -20,7 +20,8 @@ from auvest import (
     metrics,
 )
 from auvest.commands import options
-from auvest.commands.console import EXIT_CODES, ExitCode, Terminal
+from auvest.commands.console import Terminal
+from auvest.commands.exit_codes import ExitCode
 from auvest.commands.files import write_csv, write_results
 from auvest.commands.options import FILTER, MONTE_CARLO, WORLD, refuse_given
 from auvest.commands.version import version
@@ -35,8 +36,7 @@ from auvest.scenarios.tracking import Scenario, TrackingResult, simulate
 
 Floats = npt.NDArray[np.float64]
 
-HELP = f"""Simulate the AUKF paper's scenario and show errors, intervals and consistency.
-
+HELP = """\
 A station at (0.2, 2) m tracks a vehicle by range and bearing (Deng, Yin, Duan 2019, section 3).
 The AUKF chooses its own sampling interval; ekf and ukf sample at a fixed one.
 
@@ -49,8 +49,6 @@ Examples:
   auvest simulate aukf --interval covariance-budget --budget 0.08 --track turn
 
   auvest simulate aukf --preset table1 --json > table1.json
-
-{EXIT_CODES}
 """
 
 _INTERVAL = "Sampling interval"

@@ -14,7 +14,8 @@ from rich.table import Table
 
 from auvest import RejectionStreak, Status, metrics
 from auvest.commands import options
-from auvest.commands.console import EXIT_CODES, ExitCode, Terminal
+from auvest.commands.console import Terminal
+from auvest.commands.exit_codes import ExitCode
 from auvest.commands.files import write_csv, write_results
 from auvest.commands.options import FILTER, MONTE_CARLO, WORLD
 from auvest.commands.version import version
@@ -24,8 +25,7 @@ from auvest.scenarios.cooperative import NoiseKind, RangeNoise, Result, Scenario
 
 Floats = npt.NDArray[np.float64]
 
-HELP = f"""Simulate range-only cooperative localisation and show errors, weights and consistency.
-
+HELP = """\
 A slave dead-reckons and ranges to two leaders in turn, every 5 s; some ranges are outliers (Li, Du,
 Fan, Chen, Mao, Luo 2020). Every filter sees the same ranges as the EKF beside it.
 
@@ -38,8 +38,6 @@ Examples:
   auvest simulate mekf --noise multipath --outlier-sigma 30 --dropout 0.3 --late 0.3
 
   auvest simulate mekf --displaced 200 --steps 600 --json
-
-{EXIT_CODES}
 """
 
 

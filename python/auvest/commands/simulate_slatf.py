@@ -13,7 +13,8 @@ from rich.table import Table
 
 from auvest import Status, metrics, montecarlo
 from auvest.commands import options
-from auvest.commands.console import EXIT_CODES, ExitCode, Terminal
+from auvest.commands.console import Terminal
+from auvest.commands.exit_codes import ExitCode
 from auvest.commands.files import write_csv, write_results
 from auvest.commands.options import FILTER, WORLD, refuse_given
 from auvest.commands.version import version
@@ -34,8 +35,7 @@ from auvest.slat import (
 
 Floats = npt.NDArray[np.float64]
 
-HELP = f"""Simulate the SLATF paper's scenario and show errors and consistency.
-
+HELP = """\
 Communication fails for 400 s; a slave that can only dead-reckon pings its master (Lu, Chen, Liu,
 Ma, He 2020, section 7). Finished runs are kept: the same command goes on where it was stopped.
 
@@ -48,8 +48,6 @@ Examples:
   auvest simulate slatf --masters 3 --association unknown --gate 16
 
   auvest simulate slatf --filter ekf-slat --runs 1000 --table parquet --json > ekf.json
-
-{EXIT_CODES}
 """
 
 
