@@ -18,7 +18,7 @@ class Ekf : public GaussianFilter<Ekf<Process>, Process> {
   explicit Ekf(const Process& process) : Base(process, process.check()) {}
 
   Status predict_belief(BeliefType& belief, Scalar dt) const {
-    this->process().propagate(belief, dt);
+    this->process().propagate(belief, dt);  // [MEKF 7]
     return Status::kOk;
   }
 
@@ -29,7 +29,7 @@ class Ekf : public GaussianFilter<Ekf<Process>, Process> {
                    Matrix<Scalar, Model::kSize, Model::kObserved>& a,
                    typename Model::Noise& noise) const {
     innovation = model.residual(z, point.value());
-    project(point.H(), root, a);
+    project(point.H(), root, a);  // [MEKF 6]
     noise = model.R();
     model.second_order(point, root, innovation, noise);
     return Status::kOk;

@@ -39,6 +39,7 @@ class Ukf : public GaussianFilter<Ukf<Process>, Process> {
     if (points_.fine && !Model::kClosedForm) return Status::kAlphaTooSmall;
     typename Model::Measurement predicted;
     math::copy(model.R(), noise);
+    // [UKF D3]: P_oy = L A', with the t_i in the columns of A
     points_.transform(point, root, a, predicted, noise);
     AUVEST_UNROLL
     for (int m = 0; m < Model::kSize; ++m) predicted(m) = point.value()(m) + predicted(m);
@@ -77,8 +78,9 @@ class Ukf : public GaussianFilter<Ukf<Process>, Process> {
     belief.P = this->process().Q(dt);
     points_.transform(point, root, t, shift, belief.P);
     for (int i = 0; i < kStates; ++i) {
-      belief.x(i) = point.value()(i) + shift(i);
+      belief.x(i) = point.value()(i) + shift(i);  // [UKF D1]
       for (int j = 0; j <= i; ++j) {
+        // [UKF D2]
         belief.P(i, j) = math::plus_dot(belief.P(i, j), &t(i, 0), &t(j, 0), kStates);
       }
     }
