@@ -21,6 +21,7 @@ LAST_NUMBER = {"AUKF": 12, "SLATF": 65, "MEKF": 20}  # of each paper
 
 # Also what is no label but was meant as one: "[SLATF 57, 58]", or one that a line break cuts.
 LABEL = re.compile(r"\[(?:AUKF|SLATF|MEKF|UKF)\b(?:[^\]\n]*\])?")
+OPENING = re.compile(rf"\s*(?:{LABEL.pattern}\s*)*")
 OLD_FORM = re.compile(r"\bEqs?\.|\(\d+\)-\(\d+\)")
 # Lines of code that compute nothing.
 FRAME = re.compile(
@@ -34,13 +35,15 @@ def files(folder: str, *suffixes: str) -> list[Path]:
 
 
 def labelled_statements(text: str) -> set[str]:
-    """Return the labels that stand beside a statement or in the comment directly above it."""
+    """Return the labels that open a comment beside a statement or directly above it.
+
+    Others are mentions: within a sentence, or in the documentation of a function, type or member.
+    """
     labelled: set[str] = set()
     above: set[str] = set()
     for line in text.splitlines():
         code, slashes, comment = line.partition("//")
-        # "///<" documents a member, which is not where it is computed.
-        labels = set() if comment.startswith("/<") else set(LABEL.findall(comment))
+        labels = set() if comment.startswith("/") else set(LABEL.findall(OPENING.match(comment)[0]))
         if code.strip():
             labelled |= set() if FRAME.match(code) else above | labels
             above = set()
@@ -57,14 +60,17 @@ def test_statements_are_told_from_mentions():
 /// [UKF D2]: nor is a function
 template <class Value>
 Value f(Value x) const {
-  // [UKF D3]: comment of two
-  // lines
+  // [UKF D3]: differs from [UKF B1]
+  // in two lines
   const Value y = x * x;
   // [UKF D4]: a blank line below
 
   add(x, y);  // [UKF R1] [UKF R2]
 }
-Value z;  ///< that of [UKF R3]
+/// Those of [UKF R3]
+/// [UKF B2] is not computed here.
+using Values = Value[3];
+Value z;  ///< [UKF S1]
 """
     assert labelled_statements(text) == {"[UKF D3]", "[UKF R1]", "[UKF R2]"}
 

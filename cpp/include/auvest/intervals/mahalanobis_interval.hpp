@@ -168,7 +168,7 @@ struct MahalanobisInterval {
     const Scalar ab = two * cross(a, b);
     const Scalar by_c[2] = {cross(a, c), cross(b, c)};
     const Scalar sine = ab - by_c[1];
-    math::add_scaled(two, a, c, 2);  // 4 (X(k) - mean)
+    math::add_scaled(two, a, c, 2);  // [AUKF 10]: 4 (X(k) - mean)
     const Scalar ridge = Scalar(0.5) * math::machine_epsilon<Scalar>() * trace;
     const Scalar form = (Scalar(3) * (by_c[0] * by_c[0]) + sine * sine) + ridge * dot(c, c);
     // [AUKF 10]: 72 det S
