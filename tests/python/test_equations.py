@@ -21,6 +21,7 @@ LAST_NUMBER = {"AUKF": 12, "SLATF": 65, "MEKF": 20}  # of each paper
 
 # Also what is no label but was meant as one: "[SLATF 57, 58]", or one that a line break cuts.
 LABEL = re.compile(r"\[(?:AUKF|SLATF|MEKF|UKF)\b(?:[^\]\n]*\])?")
+# Those that a // comment begins with: none where it is ///.
 OPENING = re.compile(rf"\s*(?:{LABEL.pattern}\s*)*")
 OLD_FORM = re.compile(r"\bEqs?\.|\(\d+\)-\(\d+\)")
 # Lines of code that compute nothing.
@@ -43,7 +44,7 @@ def labelled_statements(text: str) -> set[str]:
     above: set[str] = set()
     for line in text.splitlines():
         code, slashes, comment = line.partition("//")
-        labels = set() if comment.startswith("/") else set(LABEL.findall(OPENING.match(comment)[0]))
+        labels = set(LABEL.findall(OPENING.match(comment)[0]))
         if code.strip():
             labelled |= set() if FRAME.match(code) else above | labels
             above = set()
@@ -57,8 +58,11 @@ def test_statements_are_told_from_mentions():
 // [UKF D1]: a file is no statement
 #pragma once
 
-/// [UKF D2]: nor is a function
+/// [UKF D2]: nor is documentation
+using Values = Value[3];
+// [UKF N1]: nor a template
 template <class Value>
+// [UKF N2]: nor a function
 Value f(Value x) const {
   // [UKF D3]: differs from [UKF B1]
   // in two lines
@@ -67,12 +71,12 @@ Value f(Value x) const {
 
   add(x, y);  // [UKF R1] [UKF R2]
 }
-/// Those of [UKF R3]
-/// [UKF B2] is not computed here.
-using Values = Value[3];
+// [UKF S2]: a loop is
+for (int i = 0; i < 3; ++i) {
 Value z;  ///< [UKF S1]
 """
-    assert labelled_statements(text) == {"[UKF D3]", "[UKF R1]", "[UKF R2]"}
+    computed = {"[UKF D3]", "[UKF R1]", "[UKF R2]", "[UKF S2]"}
+    assert labelled_statements(text) == computed
 
 
 def test_the_list_has_every_number():
