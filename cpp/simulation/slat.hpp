@@ -72,7 +72,7 @@ struct SlatScenario {
   double silent_from_s = 1e9;   ///< no echo from here ...
   double silent_to_s = 1e9;     ///< ... to here
   bool identified = true;       ///< the filter is told whose echo it hears
-  bool plan_known = true;       ///< the filter knows the masters' velocity changes, u of Eq. (4)
+  bool plan_known = true;       ///< the filter knows the masters' velocity changes, u of [SLATF 4]
   double prior_position_m = 1;  ///< standard deviations of what was shared of the masters; R1
   double prior_velocity_mps = 0.05;
   double prior_acceleration_mps2 = 1e-4;
@@ -173,6 +173,7 @@ inline Status run_slat(Filter& filter, const Sonar<typename Filter::Scalar>& son
       const double dx = slave.position[0] - masters[n].position[0];
       const double dy = slave.position[1] - masters[n].position[1];
       heard[count].master = scenario.identified ? n : kUnknownMaster;
+      // [SLATF 5]
       heard[count].z(0) = static_cast<Scalar>(math::sqrt(dx * dx + dy * dy) +
                                               scale * scenario.sigma_range_m * noise[0]);
       heard[count].z(1) = static_cast<Scalar>(

@@ -21,7 +21,7 @@ namespace auvest {
 /// acceleration along x and y, or turns at a constant rate.
 struct Track {
   enum class Kind : std::uint8_t {
-    kEuler,     ///< Eq. (4) with each sampling interval as its step: the paper's own simulation
+    kEuler,     ///< [AUKF 4] with each sampling interval as its step: the paper's own simulation
     kStraight,  ///< constant acceleration, exact for any interval
     kTurn       ///< constant speed and turn rate
   };
@@ -51,7 +51,7 @@ struct Track {
       return;
     }
     for (int i = 0; i < 2; ++i) {
-      position[i] += dt * velocity[i];
+      position[i] += dt * velocity[i];  // [AUKF 4]
       if (kind == Kind::kStraight) position[i] += 0.5 * dt * dt * acceleration[i];
       velocity[i] += dt * acceleration[i];
     }
@@ -171,6 +171,7 @@ inline Status track(Filter& filter, const Model& model, Track truth, const Senso
     noise.draw(random, range_noise, bearing_noise, missing);
     const double dx = truth.position[0] - static_cast<double>(model.params.station_x_m);
     const double dy = truth.position[1] - static_cast<double>(model.params.station_y_m);
+    // [AUKF 6]
     double z[2] = {math::sqrt(dx * dx + dy * dy) + range_noise,
                    math::wrap(math::atan2(dy, dx) + bearing_noise)};
 

@@ -15,7 +15,7 @@ AUVEST_INLINE void linearise_by_jacobian(
     const typename Model::Measurement& z, typename Model::Measurement& innovation,
     Matrix<Scalar, Model::kSize, Model::kObserved>& a, typename Model::Noise& noise) {
   innovation = model.residual(z, point.value());
-  project(point.H(), root, a);
+  project(point.H(), root, a);  // [MEKF 6]
   noise = model.R();
   model.second_order(point, root, innovation, noise);
 }
@@ -32,7 +32,7 @@ class Ekf : public GaussianFilter<Ekf<Process>, Process> {
   explicit Ekf(const Process& process) : Base(process, process.check()) {}
 
   Status predict_belief(BeliefType& belief, Scalar dt) const {
-    this->process().propagate(belief, dt);
+    this->process().propagate(belief, dt);  // [MEKF 7]
     return Status::kOk;
   }
 

@@ -25,6 +25,7 @@ AUVEST_OUTLINE_HOT Status linearise_by_points(
   if (points.fine && !Model::kClosedForm) return Status::kAlphaTooSmall;
   typename Model::Measurement predicted;
   math::copy(model.R(), noise);
+  // [UKF D3]: P_oy = L A', with the t_i in the columns of A
   points.transform(point, root, a, predicted, noise);
   AUVEST_UNROLL
   for (int m = 0; m < Model::kSize; ++m) predicted(m) = point.value()(m) + predicted(m);
@@ -58,8 +59,9 @@ Status predict_by_points(const Points& points, const Process& process, Belief<Sc
   belief.P = process.Q(dt);
   points.transform(point, root, t, shift, belief.P);
   for (int i = 0; i < N; ++i) {
-    belief.x(i) = point.value()(i) + shift(i);
+    belief.x(i) = point.value()(i) + shift(i);  // [UKF D1]
     for (int j = 0; j <= i; ++j) {
+      // [UKF D2]
       belief.P(i, j) = math::plus_dot(belief.P(i, j), &t(i, 0), &t(j, 0), N);
     }
   }

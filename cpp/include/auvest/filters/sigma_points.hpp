@@ -2,7 +2,8 @@
 //
 // c = n + lambda = alpha^2 (n + kappa). The textbook weights are 1/(2c) and lambda/c: for the
 // paper's alpha = 1e-6 that is 1.7e11 and -2e12, which cancel to nothing in 32 bits. Written with
-// deviations from the centre point the 1/c parts cancel on paper instead (docs/algorithms/ukf.md):
+// deviations from the centre point the 1/c parts cancel on paper instead, [UKF D1] to [UKF D4]
+// (docs/algorithms/ukf.md):
 //
 //     m    = sum_i (d_i+ + d_i-) / (2c)
 //     mean = h(x) + m
@@ -78,6 +79,7 @@ struct SigmaPoints {
       point.deviations(step, sum, difference);
       AUVEST_UNROLL
       for (int m = 0; m < M; ++m) {
+        // [UKF D4]
         t(m, k) = half_sqrt_c * difference(m);
         s(m, k) = half_sqrt_c * sum(m);
       }
@@ -87,7 +89,8 @@ struct SigmaPoints {
       Scalar total = s(m, 0);
       AUVEST_UNROLL
       for (int k = 1; k < O; ++k) total = total + s(m, k);
-      shift(m) = mean_weight * total;
+      shift(m) = mean_weight * total;  // [UKF D1]
+      // [UKF D2], but for t t'
       s(m, O) = centre_root * shift(m);
       AUVEST_UNROLL
       for (int l = 0; l <= m; ++l) e(m, l) = math::plus_dot(e(m, l), &s(m, 0), &s(l, 0), O + 1);

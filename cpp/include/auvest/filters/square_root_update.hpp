@@ -1,4 +1,5 @@
-// The measurement update that every Gaussian filter of auvest shares.
+// The measurement update that every Gaussian filter of auvest shares, [UKF S1] to [UKF S6]
+// (docs/algorithms/ukf.md).
 //
 // A measurement of the first O states sees the others only through their regression on these:
 //
@@ -86,6 +87,7 @@ AUVEST_INLINE void innovation_covariance(const Matrix<Value, M, O>& a,
   math::copy(noise, s);
   AUVEST_UNROLL
   for (int i = 0; i < M; ++i) {
+    // [UKF S2]
     AUVEST_UNROLL
     for (int j = 0; j <= i; ++j) s(i, j) = math::plus_dot(s(i, j), &a(i, 0), &a(j, 0), O);
   }
@@ -96,7 +98,7 @@ AUVEST_INLINE void innovation_covariance(const Matrix<Value, M, O>& a,
 template <class Value>
 AUVEST_INLINE void innovation_covariance(const Matrix<Value, 1, 2>& a,
                                          const Matrix<Value, 1, 1>& noise, Matrix<Value, 1, 1>& s) {
-  s(0, 0) = noise(0, 0) + a(0, 0) * a(0, 0) + a(0, 1) * a(0, 1);
+  s(0, 0) = noise(0, 0) + a(0, 0) * a(0, 0) + a(0, 1) * a(0, 1);  // [UKF S2]
 }
 
 /// Potter's formula, one decorrelated measurement after the other. `noise` is E = U D U' as
@@ -132,7 +134,7 @@ AUVEST_OUTLINE AUVEST_INLINE math::Mask<Value> potter(Matrix<Value, M, O>& a,
     residual(m) = math::minus_dot(innovation(m), &noise(m, 0), residual.data(), correlated);
     AUVEST_UNROLL
     for (int l = 0; l < correlated; ++l) add_scaled(-noise(m, l), &a(l, 0), row, O);
-    Vector<Value, O> f;  // G' a
+    Vector<Value, O> f;  // [UKF S3]: G' a
     AUVEST_UNROLL
     for (int k = 0; k < O; ++k) f(k) = first ? row[k] : math::dot(&g(k, 0), row, O);
     const Value spread = math::plus_dot(noise(m, m), f.data(), f.data(), O);
@@ -142,8 +144,8 @@ AUVEST_OUTLINE AUVEST_INLINE math::Mask<Value> potter(Matrix<Value, M, O>& a,
     noise(m, m) = spread;
     const Value surprise = first ? residual(m) : math::minus_dot(residual(m), row, y.data(), O);
     const Value step = surprise / spread;
-    posterior.nis = posterior.nis + step * surprise;
-    Vector<Value, O> v;  // G f
+    posterior.nis = posterior.nis + step * surprise;  // [UKF S6]
+    Vector<Value, O> v;                               // G f
     if (first) {
       v = f;
     } else {
@@ -151,11 +153,11 @@ AUVEST_OUTLINE AUVEST_INLINE math::Mask<Value> potter(Matrix<Value, M, O>& a,
       AUVEST_UNROLL
       for (int k = 0; k < O; ++k) add_scaled(f(k), &g(k, 0), v.data(), O);
     }
-    add_scaled(step, v.data(), y.data(), O);
+    add_scaled(step, v.data(), y.data(), O);  // [UKF S3]
     AUVEST_UNROLL
     for (int k = 0; k < O; ++k) v(k) = v(k) * minus_gamma;
     AUVEST_UNROLL
-    for (int k = 0; k < O; ++k) add_scaled(f(k), v.data(), &g(k, 0), O);
+    for (int k = 0; k < O; ++k) add_scaled(f(k), v.data(), &g(k, 0), O);  // [UKF S3]
   }
   return finite && is_finite(posterior.nis);
 }
@@ -175,11 +177,11 @@ AUVEST_OUTLINE AUVEST_INLINE math::Mask<Value> move_belief(Belief<Value, N>& bel
   AUVEST_UNROLL
   for (int i = 0; i < O; ++i) {
     shift(i) = dot(&root(i, 0), posterior.y.data(), i + 1);
-    x(i) = belief.x(i) + shift(i);
+    x(i) = belief.x(i) + shift(i);  // [UKF S4]
   }
   AUVEST_UNROLL
   for (int i = O; i < N; ++i) {
-    x(i) = math::plus_dot(belief.x(i), &slope(i - O, 0), shift.data(), O);
+    x(i) = math::plus_dot(belief.x(i), &slope(i - O, 0), shift.data(), O);  // [UKF S5]
   }
   const math::Mask<Value> finite = math::all_finite(x);
   if (math::is_number<Value>() && !any(finite)) return finite;
@@ -195,7 +197,7 @@ AUVEST_OUTLINE AUVEST_INLINE math::Mask<Value> move_belief(Belief<Value, N>& bel
     for (int k = 0; k < O; ++k) root(i, k) = row(k);
     AUVEST_UNROLL
     for (int j = 0; j <= i; ++j) {
-      belief.P(i, j) = dot(&root(i, 0), &root(j, 0), O);
+      belief.P(i, j) = dot(&root(i, 0), &root(j, 0), O);  // [UKF S4]
       belief.P(j, i) = belief.P(i, j);
     }
   }
@@ -209,7 +211,7 @@ AUVEST_OUTLINE AUVEST_INLINE math::Mask<Value> move_belief(Belief<Value, N>& bel
     Value change[O];  // row i of P_uo - P_uo+
     AUVEST_UNROLL
     for (int k = 0; k < O; ++k) {
-      const Value after = dot(b, &belief.P(k, 0), O);
+      const Value after = dot(b, &belief.P(k, 0), O);  // [UKF S5]
       change[k] = row[k] - after;
       row[k] = after;
     }
@@ -217,7 +219,7 @@ AUVEST_OUTLINE AUVEST_INLINE math::Mask<Value> move_belief(Belief<Value, N>& bel
     const Value* other = slope.data();
     AUVEST_UNROLL
     for (int j = O; j <= i; ++j) {
-      row[j] = math::minus_dot(row[j], change, other, O);
+      row[j] = math::minus_dot(row[j], change, other, O);  // [UKF S5]
       other += O;
     }
     row[i] = larger(row[i], floor);
@@ -256,9 +258,10 @@ AUVEST_OUTLINE AUVEST_INLINE Status correct_belief(
   const Scalar spread = correction.S(0, 0);
   const Scalar inverse = Scalar(1) / spread;
   const Scalar step = innovation * inverse;
-  const Scalar nis = step * innovation;
+  const Scalar nis = step * innovation;  // [UKF S6]
   const Scalar f0 = a(0, 0);
   const Scalar f1 = a(0, 1);
+  // [UKF S4]
   const Scalar x0 = belief.x(0) + root(0, 0) * f0 * step;
   const Scalar x1 = belief.x(1) + (root(1, 0) * f0 + root(1, 1) * f1) * step;
   const bool finite = math::is_finite(spread) && math::is_positive(inverse) &&
@@ -271,7 +274,7 @@ AUVEST_OUTLINE AUVEST_INLINE Status correct_belief(
   const Scalar u0 = root(0, 0) * f1;
   const Scalar u1 = root(1, 0) * f1 - root(1, 1) * f0;
   const Scalar u1_scaled = u1 * inverse;
-  belief.P(0, 0) = left * belief.P(0, 0) + u0 * (u0 * inverse);
+  belief.P(0, 0) = left * belief.P(0, 0) + u0 * (u0 * inverse);  // [UKF S4]
   belief.P(1, 0) = left * belief.P(1, 0) + u0 * u1_scaled;
   belief.P(0, 1) = belief.P(1, 0);
   belief.P(1, 1) = left * belief.P(1, 1) + u1 * u1_scaled;

@@ -1,8 +1,8 @@
-// The interval law of the AUKF paper (Deng, Yin, Duan 2019), Eqs. (7) to (12).
+// The interval law of the AUKF paper (Deng, Yin, Duan 2019), [AUKF 7] to [AUKF 12].
 //
-// Order inside one step: measurement update, M(k) by Eq. (7), T(k) by Eq. (8) with the tau in hand,
-// d(k) by Eqs. (9) to (11), tau(k+1) by Eq. (12). T(k) is the interval to the next sample; read
-// literally, (7) and (8) are circular. What the law can and cannot do: docs/algorithms/aukf.md.
+// Order inside one step: measurement update, M(k), T(k) with the tau in hand, d(k), tau(k+1). T(k)
+// is the interval to the next sample; read literally, [AUKF 7] and [AUKF 8] are circular. What the
+// law can and cannot do: docs/algorithms/aukf.md.
 #pragma once
 
 #include "auvest/intervals/interval_limits.hpp"
@@ -21,10 +21,10 @@ struct MahalanobisInterval {
   /// The defaults are the preset figure3.
   struct Params : IntervalLimits<Scalar> {
     Scalar tau0 = Scalar(0.5);        ///< tau(0), in (0, 1); the paper studies 0.1, 0.3, 0.5, 0.9
-    Scalar scale = Scalar(0.1);       ///< phi of Eq. (8), Table 1
-    Scalar epsilon = Scalar(1.6);     ///< eps of Eq. (12), Table 1
-    Scalar gamma1_m2 = Scalar(1e-4);  ///< gamma1 of Eq. (7) [m^2]
-    Scalar gamma2 = Scalar(1);        ///< gamma2 of Eq. (12)
+    Scalar scale = Scalar(0.1);       ///< phi of [AUKF 8], Table 1
+    Scalar epsilon = Scalar(1.6);     ///< eps of [AUKF 12], Table 1
+    Scalar gamma1_m2 = Scalar(1e-4);  ///< gamma1 of [AUKF 7] [m^2]
+    Scalar gamma2 = Scalar(1);        ///< gamma2 of [AUKF 12]
     Scalar ratio_max = Scalar(0.9);   ///< upper end of M(k): the text says 0 < M < 0.9
     Scalar tau_min = Scalar(0.01);    ///< the text says tau in (0, 1): clamped to
     Scalar tau_max = Scalar(0.99);    ///< [tau_min, tau_max]
@@ -90,7 +90,7 @@ struct MahalanobisInterval {
   template <class Filter>
   AUVEST_OUTLINE_HOT Scalar next(const Filter& filter, const Position& reference) {
     Memory& m = memory;
-    Steps steps;
+    Steps steps;  // [AUKF 9]
     for (int i = 0; i < 2; ++i) {
       const Scalar error = m.last_estimate(i) - m.last_reference(i);
       steps[0][i] = step(m.last_estimate(i), filter.x()(i));
@@ -99,13 +99,15 @@ struct MahalanobisInterval {
     }
     const Scalar aa = dot(steps[0], steps[0]);
     const Scalar bb = dot(steps[1], steps[1]);
-    m.ratio = clamp(bb / (aa + params.gamma1_m2), Scalar(0), params.ratio_max);  // Eq. (7)
+    m.ratio = clamp(bb / (aa + params.gamma1_m2), Scalar(0), params.ratio_max);  // [AUKF 7]
+    // [AUKF 8]
     m.interval =
         clamp((Scalar(1) - m.tau) * params.scale * m.interval + m.tau * m.ratio * params.max_s,
-              params.min_s, params.max_s);  // Eq. (8)
+              params.min_s, params.max_s);
     m.mahalanobis_squared = squared_distance(steps, aa, bb);
+    // [AUKF 12]: tau(k+1)
     m.tau = clamp(params.epsilon / (m.mahalanobis_squared + params.gamma2), params.tau_min,
-                  params.tau_max);  // Eq. (12), for tau(k+1)
+                  params.tau_max);
     return m.interval;
   }
 
@@ -133,8 +135,8 @@ struct MahalanobisInterval {
     return value > high ? high : value;
   }
 
-  /// The four points of Eq. (9), X(k), R(k), X(k-1) and R(k-1), without their mean:
-  ///     a = X(k) - X(k-1)                      its length is d_e of Eq. (7)
+  /// The four points of [AUKF 9], X(k), R(k), X(k-1) and R(k-1), without their mean:
+  ///     a = X(k) - X(k-1)                      its length is d_e of [AUKF 7]
   ///     b = R(k) - R(k-1)                      its length is d_t
   ///     c = X(k) + X(k-1) - R(k) - R(k-1)
   using Steps = Scalar[3][2];
@@ -148,7 +150,7 @@ struct MahalanobisInterval {
 
   static Scalar dot(const Scalar* u, const Scalar* v) { return math::dot(u, v, 2); }
 
-  /// Eqs. (9) to (11): squared Mahalanobis distance of the estimate from the four points.
+  /// Squared Mahalanobis distance of the estimate from the four points, [AUKF 9] to [AUKF 11].
   ///
   /// We read the print's (d)_2 as d^2 and take the divisor N - 1 = 3 for cov. The mean of the four
   /// points drops out of a / sqrt 2, b / sqrt 2 and c / 2, which are orthogonal contrasts of them:
@@ -182,11 +184,12 @@ struct MahalanobisInterval {
     const Scalar ab = two * cross(a, b);
     const Scalar by_c[2] = {cross(a, c), cross(b, c)};
     const Scalar sine = ab - by_c[1];
-    math::add_scaled(two, a, c, 2);  // 4 (X(k) - mean)
+    math::add_scaled(two, a, c, 2);  // [AUKF 10]: 4 (X(k) - mean)
     const Scalar ridge = Scalar(0.5) * math::machine_epsilon<Scalar>() * trace;
     const Scalar form = (Scalar(3) * (by_c[0] * by_c[0]) + sine * sine) + ridge * dot(c, c);
+    // [AUKF 10]: 72 det S
     const Scalar determinant = (Scalar(0.5) * (ab * ab) + dot(by_c, by_c)) + ridge * trace;
-    return Scalar(0.75) * (form / determinant);  // Eq. (11)
+    return Scalar(0.75) * (form / determinant);  // [AUKF 11]
   }
 };
 

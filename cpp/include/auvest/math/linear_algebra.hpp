@@ -261,7 +261,7 @@ AUVEST_OUTLINE AUVEST_INLINE Mask<Value> factor_leading(const Matrix<Value, N, N
   const Mask<Value> positive = ldlt<LostPivots>(l.data(), O, any_size, inverse.data());
   AUVEST_UNROLL
   for (int k = 0; k < O; ++k) {
-    root(k, k) = sqrt(l(k, k));
+    root(k, k) = sqrt(l(k, k));  // [UKF S1]
     AUVEST_UNROLL
     for (int i = k + 1; i < O; ++i) {
       root(i, k) = l(i, k) * root(k, k);
@@ -280,7 +280,7 @@ AUVEST_OUTLINE AUVEST_INLINE Mask<Value> factor_leading(const Matrix<Value, N, N
       Value value = row(k) * inverse(k);
       AUVEST_UNROLL
       for (int j = k + 1; j < O; ++j) value = value - l(j, k) * slope(i - O, j);
-      slope(i - O, k) = value;
+      slope(i - O, k) = value;  // [UKF S1]
     }
   }
   return positive;
@@ -292,6 +292,7 @@ AUVEST_OUTLINE AUVEST_INLINE Mask<Value> factor_leading(const Matrix<Value, 2, 2
                                                         Matrix<Value, 2, 2>& root,
                                                         Matrix<Value, 1, 2>&) {
   const Value scaled = p(1, 0) * (Value(1) / p(0, 0));
+  // [UKF S1]
   root(0, 0) = sqrt(p(0, 0));
   root(0, 1) = Value(0);
   root(1, 0) = scaled * root(0, 0);

@@ -1,13 +1,13 @@
-// Planar constant acceleration: state [x, y, vx, vy, ax, ay] (m, m/s, m/s^2), Eq. (5) of the AUKF
-// paper (Deng, Yin, Duan 2019).
+// Planar constant acceleration: state [x, y, vx, vy, ax, ay] (m, m/s, m/s^2), [AUKF 4] and [AUKF 5]
+// of the AUKF paper (Deng, Yin, Duan 2019).
 //
 // With N the shift that maps velocity to position and acceleration to velocity, the transition
 // matrix is Phi(dt) = exp(N dt) = I + N dt + N^2 dt^2 / 2. The paper stops after the first power:
 //
-//   EulerAcceleration   Phi = I + N dt                 exactly Eq. (4), no dt^2/2 term
+//   EulerAcceleration   Phi = I + N dt                 exactly [AUKF 4], no dt^2/2 term
 //   ExactAcceleration   Phi = I + N dt + N^2 dt^2 / 2  the exact discretisation
 //
-// Differs from Eq. (4): the paper gives no covariance for its process noise w. Here white noise
+// Differs from [AUKF 4]: the paper gives no covariance for its process noise w. Here white noise
 // drives each derivative with a power spectral density per state, so that Q fits any interval:
 // Q = dt diag(q) to first order (Euler), and the integral of Phi(s) diag(q) Phi(s)' ds (exact).
 #pragma once
@@ -38,7 +38,7 @@ struct ConstantAcceleration : ProcessModel<ConstantAcceleration<Scalar_, Order>,
   using Base = ProcessModel<ConstantAcceleration<Scalar_, Order>, Scalar_, 6>;
   using Scalar = Scalar_;
   using typename Base::Covariance;
-  using typename Base::State;
+  using typename Base::State;  // [AUKF 5]
   using Params = AccelerationNoise<Scalar>;
   static constexpr bool kLinear = true;
 
@@ -46,10 +46,10 @@ struct ConstantAcceleration : ProcessModel<ConstantAcceleration<Scalar_, Order>,
 
   explicit ConstantAcceleration(const Params& noise = Params()) : params(noise) {}
 
-  /// Eq. (4): x(k+1) = Phi(dt) x(k).
+  /// x(k+1) = Phi(dt) x(k).
   State f(const State& x, Scalar dt) const {
     State next = x;
-    advance(next.data(), 6, Coefficients(dt));
+    advance(next.data(), 6, Coefficients(dt));  // [AUKF 4]
     return next;
   }
 
@@ -94,7 +94,7 @@ struct ConstantAcceleration : ProcessModel<ConstantAcceleration<Scalar_, Order>,
       advance(row, i + 1, c);
     }
     add_noise(p, dt);
-    advance(belief.x.data(), 6, c);
+    advance(belief.x.data(), 6, c);  // [AUKF 4]
   }
 
   /// P_xx + P_yy after dt seconds, without forming the rest of P.
@@ -183,7 +183,7 @@ struct ConstantAcceleration : ProcessModel<ConstantAcceleration<Scalar_, Order>,
   }
 };
 
-/// The paper's model, exactly Eq. (4).
+/// The paper's model, exactly [AUKF 4].
 template <class Scalar>
 using EulerAcceleration = ConstantAcceleration<Scalar, 1>;
 

@@ -1,10 +1,11 @@
-// Range to a leader of known position, Eqs. (4)-(5) of the M-estimation EKF paper (Li, Du, Fan,
-// Chen, Mao, Luo 2020), in the plane. Position are the first two of the N states.
+// Range to a leader of known position, [MEKF 4] and [MEKF 5] of the M-estimation EKF paper (Li, Du,
+// Fan, Chen, Mao, Luo 2020), in the plane. Position are the first two of the N states.
 //
 //     z = |(x, y) - leader| + e,   var e = sigma_range^2 + sigma_leader^2
 //
-// Differs from Eq. (4): the print repeats one component of x; it means components 1 and 2. Differs
-// from Eq. (5): the leader's position is uncertain too, alike in all directions, and so the range.
+// Differs from [MEKF 4]: the print repeats one component of x; it means components 1 and 2.
+// Differs from [MEKF 5]: the leader's position is uncertain too, alike in all directions, and so
+// the range.
 //
 // Seen across the line of sight, at distance r, a circle bends: with v = n' P n, n normal to it,
 // the second-order term of h has the mean v / (2 r) and the variance v^2 / (2 r^2). Both are
@@ -25,7 +26,7 @@ template <class Scalar>
 struct LeaderRangeParams {
   Scalar leader_x_m = Scalar(0);
   Scalar leader_y_m = Scalar(0);
-  Scalar sigma_range_m = Scalar(1);   ///< s_e, Eq. (5)
+  Scalar sigma_range_m = Scalar(1);   ///< s_e of [MEKF 5]
   Scalar sigma_leader_m = Scalar(0);  ///< of the leader's position, per axis
 
   /// Names every member, in the order of stored records.
@@ -96,9 +97,9 @@ struct LeaderRange : MeasurementModel<LeaderRange<Scalar_, N>, Scalar_, N, 1, 2>
       const Scalar a_sum = a_plus + a_minus;
       const Scalar product = a_plus * a_minus;
       const bool inside = w > Scalar(0);
-      const Scalar g = inside ? Scalar(4) * qq / (product + w) : product - w;
-      sum(0) = (range + range) * g / (a_sum + Scalar(2));
-      difference(0) = Scalar(4) * range * p / a_sum;
+      const Scalar g = inside ? Scalar(4) * qq / (product + w) : product - w;  // [UKF R3]
+      sum(0) = (range + range) * g / (a_sum + Scalar(2));                      // [UKF R2]
+      difference(0) = Scalar(4) * range * p / a_sum;                           // [UKF R1]
     }
   };
 
@@ -107,7 +108,7 @@ struct LeaderRange : MeasurementModel<LeaderRange<Scalar_, N>, Scalar_, N, 1, 2>
     const Scalar dx = x(0) - params.leader_x_m;
     const Scalar dy = x(1) - params.leader_y_m;
     Expansion point;
-    point.range = sqrt(dx * dx + dy * dy);
+    point.range = sqrt(dx * dx + dy * dy);  // [MEKF 4]
     point.centre(0) = point.range;
     point.inverse = point.range > Scalar(1e-15) ? Scalar(1) / point.range : Scalar(0);
     point.ux = dx * point.inverse;
@@ -115,13 +116,13 @@ struct LeaderRange : MeasurementModel<LeaderRange<Scalar_, N>, Scalar_, N, 1, 2>
     return point;
   }
 
-  /// Eq. (4) without noise.
+  /// The range without noise.
   Measurement h(const State& x) const { return about(x).centre; }
   Jacobian H(const State& x) const { return about(x).H(); }
 
-  /// Eq. (5).
   Noise R() const {
     Noise noise;
+    // [MEKF 5]
     noise(0, 0) =
         params.sigma_range_m * params.sigma_range_m + params.sigma_leader_m * params.sigma_leader_m;
     return noise;

@@ -1,4 +1,4 @@
-// The master of SLATF, Eq. (4): state [x, y, vx, vy, ax, ay] with exact transition Phi (the
+// The master of SLATF, [SLATF 4]: state [x, y, vx, vy, ax, ay] with exact transition Phi (the
 // dt^2/2 terms included), a known velocity change u and G = [dt^2/2, dt, 1]' per axis:
 //
 //     X(k+1) = Phi X(k) + E u(k) + G w(k),   w ~ N(0, q^2) per axis
@@ -29,7 +29,7 @@ struct PiecewiseAcceleration : ProcessModel<PiecewiseAcceleration<Scalar_>, Scal
 
   explicit PiecewiseAcceleration(const Params& p = Params()) : params(p) {}
 
-  State f(const State& x, Scalar dt) const { return noiseless().f(x, dt); }
+  State f(const State& x, Scalar dt) const { return noiseless().f(x, dt); }  // [SLATF 4]
   Covariance Phi(const State& x, Scalar dt) const { return noiseless().Phi(x, dt); }
 
   Covariance Q(Scalar dt) const {
@@ -40,9 +40,10 @@ struct PiecewiseAcceleration : ProcessModel<PiecewiseAcceleration<Scalar_>, Scal
     return q;
   }
 
-  /// Eqs. (15) and (16) without u: x <- Phi x, P <- Phi P Phi' + G q^2 G' in place.
+  /// Without u: x <- Phi x, P <- Phi P Phi' + G q^2 G' in place.
   template <class Value>
   AUVEST_INLINE void propagate(Belief<Value, 6>& belief, Scalar dt) const {
+    // [SLATF 15] [SLATF 16]
     noiseless().propagate(belief, dt);
     add_noise(belief.P, dt);
   }

@@ -1,10 +1,10 @@
-// Range and bearing from a fixed station, Eq. (6) of the AUKF paper (Deng, Yin, Duan 2019).
+// Range and bearing from a fixed station, [AUKF 6] of the AUKF paper (Deng, Yin, Duan 2019).
 //
 //   r = |D| + v_r,  bearing = atan2(D_y, D_x) + v_b,  D = (x, y) - station
 //
-// Differs from Eq. (6): atan2 where the paper prints arctan, and residuals wrapped to (-pi, pi].
+// Differs from [AUKF 6]: atan2 where the paper prints arctan, and residuals wrapped to (-pi, pi].
 //
-// Deviations in closed form. With the complex number u = p + i q,
+// Deviations in closed form, [UKF R1] to [UKF B2]. With the complex number u = p + i q,
 //     p = D.e / |D|^2,   q = (D x e) / |D|^2,
 // a sigma point D + e is D (1 + u). Everything the unscented transform needs follows from
 // a+- = |1 +- u| and w = 1 - |u|^2, and nothing cancels (derived in docs/algorithms/ukf.md):
@@ -113,11 +113,11 @@ struct RangeBearing : MeasurementModel<RangeBearing<Scalar_, N>, Scalar_, N, 2, 
       const Scalar a_sum = a_plus + a_minus;
       const Scalar a_product = a_plus * a_minus;
       Scalar g = a_product - w;
-      if (w > Scalar(0)) g = two_q * two_q / (a_product + w);
-      sum(0) = two_range * g / (a_sum + Scalar(2));
-      difference(0) = two_range * (p + p) / a_sum;
-      sum(1) = atan2(-(p * two_q), (one - pp) + qq);
-      difference(1) = atan2(two_q, w);
+      if (w > Scalar(0)) g = two_q * two_q / (a_product + w);  // [UKF R3]
+      sum(0) = two_range * g / (a_sum + Scalar(2));            // [UKF R2]
+      difference(0) = two_range * (p + p) / a_sum;             // [UKF R1]
+      sum(1) = atan2(-(p * two_q), (one - pp) + qq);           // [UKF B1]
+      difference(1) = atan2(two_q, w);                         // [UKF B2]
     }
 
    private:
@@ -136,19 +136,20 @@ struct RangeBearing : MeasurementModel<RangeBearing<Scalar_, N>, Scalar_, N, 2, 
     point.square = math::dot(point.offset, point.offset, 2);
     point.range = sqrt(point.square);
     point.inverse_square = Scalar(1) / point.square;
+    // [AUKF 6]
     point.centre(0) = point.range;
     point.centre(1) = atan2(point.offset[1], point.offset[0]);
     return point;
   }
 
-  /// Eq. (6) without noise; at the station itself range 0 and bearing 0.
+  /// Range and bearing without noise; at the station itself range 0 and bearing 0.
   Measurement h(const State& x) const {
     using math::atan2;
     using math::sqrt;
     const Scalar dx = x(0) - params.station_x_m;
     const Scalar dy = x(1) - params.station_y_m;
     Measurement z;
-    z(0) = sqrt(dx * dx + dy * dy);
+    z(0) = sqrt(dx * dx + dy * dy);  // [AUKF 6]
     z(1) = atan2(dy, dx);
     return z;
   }
@@ -175,7 +176,7 @@ struct RangeBearing : MeasurementModel<RangeBearing<Scalar_, N>, Scalar_, N, 2, 
   AUVEST_INLINE bool near_field(const Expansion& point, const Matrix<Scalar, N, N>& P,
                                 const Measurement& z, Measurement& innovation, Noise& noise) const {
     const Scalar reach = params.near_field * params.near_field * (P(0, 0) + P(1, 1));
-    if (point.square > reach + Scalar(1e-30)) return false;
+    if (point.square > reach + Scalar(1e-30)) return false;  // [UKF N1]
     as_position(point, z, innovation, noise);
     return true;
   }
@@ -196,6 +197,7 @@ struct RangeBearing : MeasurementModel<RangeBearing<Scalar_, N>, Scalar_, N, 2, 
     const Scalar range2 = z(0) * z(0);
     const Scalar var_range = params.sigma_range_m * params.sigma_range_m;
     const Scalar var_bearing = params.sigma_bearing_rad * params.sigma_bearing_rad;
+    // [UKF N2] [UKF N3]
     const Scalar along = math::sqrt(var_range + Scalar(0.75) * range2 * var_bearing * var_bearing);
     const Scalar across = math::sqrt((range2 + var_range) * var_bearing);
     const Scalar root[2][2] = {{along * cosine, -(across * sine)}, {along * sine, across * cosine}};

@@ -1,11 +1,11 @@
-// How the slave moves, Eqs. (1) to (3): dead reckoning from readings u that carry noise.
+// How the slave moves, [SLATF 1] to [SLATF 3]: dead reckoning from readings u that carry noise.
 //
-//     CompassMotion    u = (speed, heading)   state [x, y]           the paper's Eq. (2)
+//     CompassMotion    u = (speed, heading)   state [x, y]           the paper's [SLATF 2]
 //     UnicycleMotion   u = (speed, yaw rate)  state [x, y, heading]
 //
-// The paper writes V_k = V_mk + w; we read: measured = true + noise. In its Eq. (2) the position
-// uses the measured heading, while the pose's own heading integrates increments and feeds nothing:
-// CompassMotion leaves it out.
+// The paper writes V_k = V_mk + w; we read: measured = true + noise. Differs from [SLATF 2]: there
+// the position uses the measured heading, while the pose's own heading integrates increments and
+// feeds nothing. CompassMotion leaves it out.
 //
 // Bias of the heading noise. E[cos(phi + w)] = exp(-sigma^2 / 2) cos(phi): with sigma = 0.3 rad
 // every displacement computed from a noisy heading is 4.4 % short on average, and 8.6 % where
@@ -72,6 +72,7 @@ struct CompassMotion {
     const Scalar reach = dt * (params.compensate_bias ? exp(Scalar(0.5) * variance) : one);
     Scalar sine, cosine;
     sincos(s.heading, sine, cosine);
+    // [SLATF 2]
     s.dx = reach * s.speed * cosine;
     s.dy = reach * s.speed * sine;
     // G = [c, -V s; s, V c] reach: `along` and `across` are its columns' lengths.
@@ -83,7 +84,7 @@ struct CompassMotion {
     return s;
   }
 
-  /// Eq. (10): Eq. (2) at a speed and a heading drawn about the readings.
+  /// The motion at a speed and a heading drawn about the readings.
   template <class Value>
   AUVEST_INLINE void sample(const Step& s, const Value& a, const Value& b,
                             Vector<Value, 2>& pose) const {
@@ -91,15 +92,18 @@ struct CompassMotion {
     const Value distance = s.reach * (s.speed + params.sigma_speed_mps * a);
     Value sine, cosine;
     sincos(Value(s.heading + params.sigma_heading_rad * b), sine, cosine);
+    // [SLATF 10], by [SLATF 2]
     pose(0) = pose(0) + distance * cosine;
     pose(1) = pose(1) + distance * sine;
   }
 
-  /// Eqs. (11) and (50); Phi = I.
+  /// Phi = I.
   template <class Value>
   AUVEST_INLINE void propagate(const Step& s, Belief<Value, 2>& pose) const {
+    // [SLATF 11]
     pose.x(0) = pose.x(0) + s.dx;
     pose.x(1) = pose.x(1) + s.dy;
+    // [SLATF 50]
     pose.P(0, 0) = pose.P(0, 0) + s.xx;
     pose.P(1, 0) = pose.P(1, 0) + s.xy;
     pose.P(1, 1) = pose.P(1, 1) + s.yy;
@@ -165,6 +169,7 @@ struct UnicycleMotion {
     const Value distance = s.dt * (s.speed + params.sigma_speed_mps * a);
     Value sine, cosine;
     sincos(pose(2), sine, cosine);
+    // [SLATF 10]
     pose(0) = pose(0) + distance * cosine;
     pose(1) = pose(1) + distance * sine;
     pose(2) = wrap(Value(pose(2) + s.dt * (s.yaw_rate + params.sigma_yaw_rate_radps * b)));
@@ -182,6 +187,7 @@ struct UnicycleMotion {
     const Value q = distance * cosine;
     const Value p = -(distance * sine);
     Matrix<Value, 3, 3>& c = pose.P;
+    // [SLATF 50]
     const Value xh = c(2, 0) + p * c(2, 2);
     const Value yh = c(2, 1) + q * c(2, 2);
     c(0, 0) = c(0, 0) + p * (c(2, 0) + xh);
@@ -197,6 +203,7 @@ struct UnicycleMotion {
     c(1, 0) = c(1, 0) + gx * gy;
     c(1, 1) = c(1, 1) + gy * gy;
     c(2, 2) = c(2, 2) + turn * turn;
+    // [SLATF 11]
     pose.x(0) = pose.x(0) + q;
     pose.x(1) = pose.x(1) - p;
     pose.x(2) = wrap(Value(pose.x(2) + s.dt * s.yaw_rate));

@@ -1,6 +1,6 @@
-// Dead reckoning by speed and heading, Eqs. (1)-(3) of the M-estimation EKF paper (Li, Du, Fan,
-// Chen, Mao, Luo 2020). State [x, y] (m), then what of the instruments is estimated with it: the
-// heading bias (rad) and the relative speed error, if the template arguments say so.
+// Dead reckoning by speed and heading, [MEKF 1] to [MEKF 3] of the M-estimation EKF paper (Li, Du,
+// Fan, Chen, Mao, Luo 2020). State [x, y] (m), then what of the instruments is estimated with it:
+// the heading bias (rad) and the relative speed error, if the template arguments say so.
 //
 //     x += dt (v_f cos th - v_s sin th)        th  = measured heading + bias
 //     y += dt (v_f sin th + v_s cos th)        v_f, v_s = (1 + scale) measured velocities
@@ -10,11 +10,11 @@
 // v_s its lateral v_x, to starboard. The formula is as good for x east, y north, th from east
 // anticlockwise and v_s to port; nothing else may be mixed.
 //
-// Noise, Eqs. (2)-(3): errors of the forward speed and of the heading, through the Jacobian of
-// Eq. (1), so that Q is in metres. Differs from Eq. (2): a variance per second and not per step, so
-// that Q does not depend on how often the input is read; for dt = 1 s the two agree. The paper has
-// one speed noise; that of the lateral speed is 0 unless it is set. Q takes the heading as
-// measured: its bias turns the noise by a small angle only.
+// Noise: errors of the forward speed and of the heading, through the Jacobian of [MEKF 1], so that
+// Q is in metres. Differs from [MEKF 3]: a variance per second and not per step, so that Q does not
+// depend on how often the input is read; for dt = 1 s the two agree. The paper has one speed noise;
+// that of the lateral speed is 0 unless it is set. Q takes the heading as measured: its bias turns
+// the noise by a small angle only.
 #pragma once
 
 #include "auvest/math/trigonometry.hpp"
@@ -25,9 +25,9 @@ namespace auvest {
 /// Of the model in all its sizes.
 template <class Scalar>
 struct SpeedHeadingParams {
-  Scalar sigma_forward = Scalar(0.1);        ///< s_v [m/s/sqrt(Hz)], Eq. (2)
+  Scalar sigma_forward = Scalar(0.1);        ///< s_v of [MEKF 3] [m/s/sqrt(Hz)]
   Scalar sigma_starboard = Scalar(0);        ///< [m/s/sqrt(Hz)]
-  Scalar sigma_heading = Scalar(0.0174533);  ///< s_th [rad/sqrt(Hz)], Eq. (2); 1 deg
+  Scalar sigma_heading = Scalar(0.0174533);  ///< s_th of [MEKF 3] [rad/sqrt(Hz)]; 1 deg
   Scalar bias_walk = Scalar(1e-4);           ///< of the heading bias [rad/sqrt(s)]
   Scalar scale_walk = Scalar(1e-4);          ///< of the speed scale [1/sqrt(s)]
 
@@ -61,10 +61,10 @@ struct SpeedHeading : ProcessModel<SpeedHeading<Scalar_, HeadingBias, SpeedScale
 
   explicit SpeedHeading(const Params& p = Params()) : params(p) { math::set_zero(input); }
 
-  /// Eq. (1).
   State f(const State& x, Scalar dt) const {
     const Motion motion(*this, bias(x), scale(x));
     State next = x;
+    // [MEKF 1]
     next(0) = x(0) + dt * motion.vx;
     next(1) = x(1) + dt * motion.vy;
     return next;
@@ -88,9 +88,9 @@ struct SpeedHeading : ProcessModel<SpeedHeading<Scalar_, HeadingBias, SpeedScale
     return phi;
   }
 
-  /// Eqs. (2)-(3).
   Covariance Q(Scalar dt) const {
     const Motion motion(*this, Scalar(0), Scalar(0));
+    // [MEKF 3]
     const Scalar forward = dt * params.sigma_forward * params.sigma_forward;
     const Scalar starboard = dt * params.sigma_starboard * params.sigma_starboard;
     const Scalar heading = dt * params.sigma_heading * params.sigma_heading;
@@ -98,6 +98,7 @@ struct SpeedHeading : ProcessModel<SpeedHeading<Scalar_, HeadingBias, SpeedScale
     const Scalar s = motion.sine;
     Covariance q;
     math::set_zero(q);
+    // [MEKF 2]: Gamma diag(forward, heading) Gamma'
     q(0, 0) = forward * c * c + starboard * s * s + heading * motion.vy * motion.vy;
     q(1, 1) = forward * s * s + starboard * c * c + heading * motion.vx * motion.vx;
     q(1, 0) = (forward - starboard) * c * s - heading * motion.vx * motion.vy;
@@ -134,6 +135,7 @@ struct SpeedHeading : ProcessModel<SpeedHeading<Scalar_, HeadingBias, SpeedScale
       const Scalar factor = Scalar(1) + speed_scale;
       const Scalar forward = factor * model.input(0);
       const Scalar starboard = factor * model.input(1);
+      // [MEKF 1]
       vx = forward * cosine - starboard * sine;
       vy = forward * sine + starboard * cosine;
     }

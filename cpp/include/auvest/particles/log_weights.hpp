@@ -28,10 +28,10 @@ AUVEST_INLINE Value weight_of(const Value& log_weight) {
 template <class Scalar>
 struct WeightSummary {
   Scalar log_sum;         ///< logarithm of the sum of the weights before normalisation
-  Scalar effective_size;  ///< N_eff = 1 / sum w^2, Eq. (33), from 1 to N
+  Scalar effective_size;  ///< N_eff = 1 / sum w^2 of [SLATF 33], from 1 to N
 };
 
-/// Eq. (32) with logarithms: the largest weight is taken out before the exponential, so at least
+/// [SLATF 32] with logarithms: the largest weight is taken out before the exponential, so at least
 /// one term of the sum is 1, however far below the format's range all weights lie.
 template <class Lanes, class Set>
 inline WeightSummary<typename Lanes::Scalar> normalise(const Set& set) {
@@ -65,11 +65,11 @@ inline WeightSummary<typename Lanes::Scalar> normalise(const Set& set) {
   const Scalar log_total = log(total);
   for (int i = 0; i < n; i += Lanes::kWidth) {
     const Value relative = Lanes::load(log_weights + i) - Value(largest);
-    Lanes::store(log_weights + i, relative - Value(log_total));
+    Lanes::store(log_weights + i, relative - Value(log_total));  // [SLATF 32]
   }
   WeightSummary<Scalar> summary;
   summary.log_sum = largest + log_total;
-  summary.effective_size = total * total / squares.total();
+  summary.effective_size = total * total / squares.total();  // [SLATF 33]
   return summary;
 }
 

@@ -1,8 +1,9 @@
 // What the robust update asks of a kernel, and what every kernel inherits.
 //
 // A kernel says how a residual t, in multiples of its standard deviation, counts in the sum of
-// rho(t) that the update minimises, Eqs. (9)-(19) of the M-estimation EKF paper (Li, Du, Fan, Chen,
-// Mao, Luo 2020). It is a plain struct that derives from Kernel<Itself, Scalar> and offers
+// rho(t) that the update minimises, [MEKF 9] to [MEKF 19] of the M-estimation EKF paper (Li, Du,
+// Fan, Chen, Mao, Luo 2020). It is a plain struct that derives from Kernel<Itself, Scalar> and
+// offers
 //
 //     Scalar weight(t) const   psi(t) / t: 1 at t = 0, never negative
 //     Scalar rho(t) const      the loss, 0 at t = 0 and t^2 / 2 near it

@@ -1,4 +1,4 @@
-// The robust measurement update: iteratively reweighted least squares, Eqs. (9)-(19) of the
+// The robust measurement update: iteratively reweighted least squares, [MEKF 9] to [MEKF 19] of the
 // M-estimation EKF paper (Li, Du, Fan, Chen, Mao, Luo 2020), on the shared square-root form.
 //
 // The paper stacks prior and measurement and minimises the sum of rho over their residuals,
@@ -11,9 +11,10 @@
 // from the same prior. A component of weight 0 is left out. The weights of innovations do not
 // depend on the solution, so that form takes one.
 //
-// Differs from Eqs. (9)-(19): the print does not whiten, here both blocks are (by L and by E), as
-// the thresholds of Eq. (20) in multiples of sigma require. Only the measurement is weighted, the
-// prior is not. The noise in Eq. (7) and the sign of J above Eq. (12) are misprinted.
+// Differs from [MEKF 9]: the print does not whiten, here both blocks are (by L and by E), as the
+// thresholds of [MEKF 20] in multiples of sigma require. Differs from [MEKF 16]: only the
+// measurement is weighted, the prior is not. The noise in [MEKF 7] and the sign of J above
+// [MEKF 12] are misprinted.
 //
 // Off-diagonal elements of E are not divided by weights: an outlier is a component with extra
 // noise of its own, which says nothing about the noise of the others.
@@ -92,7 +93,7 @@ struct RobustUpdate {
              RobustCorrection<Scalar, M>& correction) const {
     using math::sqrt;
     correction.standardised(m) = residual / sqrt(variance);
-    correction.weight(m) = kernel.weight(correction.standardised(m));
+    correction.weight(m) = kernel.weight(correction.standardised(m));  // [MEKF 16]
   }
 
   template <int M>
@@ -122,13 +123,14 @@ struct RobustUpdate {
       weigh(a, noise, correction, rows, e, innovation);
       if (!math::ldlt(e)) return Status::kNotPositiveDefinite;
       Posterior<Scalar, O> posterior;
-      if (!potter(rows, e, innovation, posterior)) return Status::kOverflow;
+      if (!potter(rows, e, innovation, posterior)) return Status::kOverflow;  // [MEKF 18]
       ++correction.iterations;
       if (correction.iterations >= params.max_iterations) break;
       const Vector<Scalar, M> before = correction.weight;
       settled = true;
       bool all_zero = true;
       for (int m = 0; m < M; ++m) {
+        // [MEKF 11]
         judge(m, math::minus_dot(correction.innovation(m), &a(m, 0), posterior.y.data(), O),
               noise(m, m), correction);
         const Scalar change = correction.weight(m) - before(m);
@@ -168,7 +170,7 @@ struct RobustUpdate {
     innovation_covariance(rows, e, weighted.S);
     Matrix<Scalar, O, O> moved;
     math::copy(root, moved);
-    return correct_belief(belief, moved, slope, rows, e, weighted);
+    return correct_belief(belief, moved, slope, rows, e, weighted);  // [MEKF 18] [MEKF 19]
   }
 
   /// The same for one number: the NIS is known, and S grows as E does. Uses up all but `slope`.
@@ -188,7 +190,7 @@ struct RobustUpdate {
       const Scalar weighted = noise(0, 0) / correction.weight(0);
       correction.S(0, 0) = s + (weighted - noise(0, 0));
       noise(0, 0) = weighted;
-      status = correct_belief(belief, root, slope, a, noise, correction);
+      status = correct_belief(belief, root, slope, a, noise, correction);  // [MEKF 18] [MEKF 19]
       correction.S(0, 0) = s;
     }
     correction.nis = nis;

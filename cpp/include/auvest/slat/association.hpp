@@ -40,8 +40,8 @@ struct Score {
   Value log_density;
 };
 
-/// NIS and density of an echo z of a master at `place`: by S of Eq. (23), or where the pose has a
-/// covariance (`uncertain`, 2.0) by L of Eq. (65).
+/// NIS and density of an echo z of a master at `place`: by S of [SLATF 23], or where the pose has a
+/// covariance (`uncertain`, 2.0) by L of [SLATF 65].
 template <class Scalar, class Value, int Pose>
 AUVEST_INLINE Score<Value> score(const Sonar<Scalar>& sonar, const Vector<Scalar, 2>& z,
                                  const Place<Value>& place, const Belief<Value, Pose>& pose,
@@ -56,13 +56,14 @@ AUVEST_INLINE Score<Value> score(const Sonar<Scalar>& sonar, const Vector<Scalar
     math::factor_leading<math::DropLostPivots>(pose.P, root, no_others);
     project(view.by_slave, root, by_slave);
     Matrix<Value, 2, 2> spread;
-    innovation_covariance(by_slave, noise, spread);
+    innovation_covariance(by_slave, noise, spread);  // [SLATF 65]
     noise = spread;
     math::ldlt(noise);
   }
   Matrix<Value, 2, 2> by_master;
   project(view.by_master, place.root, by_master);
   Posterior<Value, 2> posterior;
+  // [SLATF 23]: S = A A' + R as a product of variances
   const math::Mask<Value> valid = potter(by_master, noise, view.innovation, posterior);
   Score<Value> result;
   result.nis = posterior.nis;

@@ -76,18 +76,18 @@ struct JointGaussian {
     put(pose, 0, joint);
   }
 
-  /// Eqs. (11), (15), (16) and (50), block by block: P_ij <- Phi_i P_ij Phi_j' + (i = j) Q_i.
+  /// Slave and masters move, block by block: P_ij <- Phi_i P_ij Phi_j' + (i = j) Q_i.
   void predict(const typename Motion::Step& step, Scalar dt, const Vector<Scalar, 2>* changes,
                int masters, Joint& joint) const {
     SlaveBelief pose = part<kPose>(joint, 0);
     const typename Motion::Covariance by_pose = motion.transition(step, pose.x);
-    motion.propagate(step, pose);
+    motion.propagate(step, pose);  // [SLATF 11] [SLATF 50]
     put(pose, 0, joint);
     Matrix<Scalar, 6, 6> by_master[Masters];
     for (int n = 0; n < masters; ++n) {
       MasterBelief moved = part<6>(joint, first_of(n));
       by_master[n] = master[n].Phi(moved.x, dt);
-      master[n].propagate(moved, dt);
+      master[n].propagate(moved, dt);  // [SLATF 15] [SLATF 16]
       if (changes != nullptr) add_planned_change(changes[n], dt, moved.x);
       put(moved, first_of(n), joint);
       move_block(by_master[n], first_of(n), by_pose, 0, joint);
@@ -258,7 +258,7 @@ struct JointGaussian {
     for (int k = 2; k < kPose; ++k) joint.x(k) = math::wrap(joint.x(k));  // the heading
   }
 
-  /// The innovation of z, and A = H L with H = [G_S, G_M] of Eqs. (51) and (20).
+  /// The innovation of z, and A = H L with H = [G_S, G_M] of [SLATF 51].
   static void look(const Joint& ordered, const Matrix<Scalar, kObserved, kObserved>& root,
                    const Vector<Scalar, 2>& z, const Sonar<Scalar>& sonar,
                    Matrix<Scalar, 2, kObserved>& a, Vector<Scalar, 2>& innovation) {

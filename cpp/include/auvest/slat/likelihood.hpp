@@ -9,8 +9,8 @@
 
 namespace auvest {
 
-/// log N(innovation; 0, S) + M/2 log(2 pi), Eq. (31), from what potter() leaves; never below -1e20,
-/// nor a NaN. -1e20 where `valid` is false.
+/// log N(innovation; 0, S) + M/2 log(2 pi) from what potter() leaves; never below -1e20, nor a NaN.
+/// -1e20 where `valid` is false.
 template <class Value, int O, int M>
 AUVEST_INLINE Value log_density(const math::Mask<Value>& valid,
                                 const Posterior<Value, O>& posterior,
@@ -22,7 +22,7 @@ AUVEST_INLINE Value log_density(const math::Mask<Value>& valid,
   Value determinant = variances(0, 0);
   AUVEST_UNROLL
   for (int m = 1; m < M; ++m) determinant = determinant * variances(m, m);
-  const Value density = Value(-0.5) * (posterior.nis + log(determinant));
+  const Value density = Value(-0.5) * (posterior.nis + log(determinant));  // [SLATF 31]
   return select(valid, larger(least, density), least);
 }
 

@@ -45,12 +45,11 @@ struct MasterBank {
     store_belief<Lanes>(at, belief);
   }
 
-  /// Eqs. (15) and (16).
   static AUVEST_INLINE void predict(const Master& master, Scalar dt,
                                     const Vector<Scalar, 2>* change, Scalar* at) {
     Gaussian belief;
     load_belief<Lanes>(at, belief);
-    master.propagate(belief, dt);
+    master.propagate(belief, dt);  // [SLATF 15] [SLATF 16]
     if (change != nullptr) add_planned_change(*change, dt, belief.x);
     store_belief<Lanes>(at, belief);
   }

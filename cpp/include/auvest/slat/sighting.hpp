@@ -50,12 +50,13 @@ inline bool plan_finite(const Vector<Scalar, 2>* changes, int masters) {
   return true;
 }
 
-/// E u of Eq. (4): the velocity change [m/s], spread evenly over dt, on [x, y, vx, vy, ...].
+/// E u of [SLATF 4]: the velocity change [m/s], spread evenly over dt, on [x, y, vx, vy, ...].
 template <class Value, class Scalar>
 AUVEST_INLINE void add_planned_change(const Vector<Scalar, 2>& change, Scalar dt,
                                       Vector<Value, 6>& x) {
   AUVEST_UNROLL
   for (int axis = 0; axis < 2; ++axis) {
+    // [SLATF 4]
     x(axis) = x(axis) + Scalar(0.5) * dt * change(axis);
     x(2 + axis) = x(2 + axis) + change(axis);
   }
