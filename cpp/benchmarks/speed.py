@@ -84,7 +84,7 @@ def run_auvest(z: np.ndarray, dtype: str) -> np.ndarray:
             velocity_psd=PSD[1],
             acceleration_psd=PSD[2],
         ),
-        measurement=auvest.RangeBearing(
+        sensors=auvest.RangeBearing(
             station=STATION, sigma_range_m=SIGMA[0], sigma_bearing_rad=SIGMA[1]
         ),
         alpha=ALPHA,

@@ -428,6 +428,15 @@ void bind_precision(py::module_& m) {
             f.report = desk::Report<Scalar>();
           },
           py::arg("x0").noconvert(), py::arg("P0").noconvert(), py::arg("reference").noconvert())
+      .def("copy",
+           [](const Filter& f) {
+             require_idle(f);
+             Filter twin;
+             twin.filter = f.filter->clone();
+             twin.report = f.report;
+             twin.status = f.status;
+             return twin;
+           })
       .def("predict", &predict<Scalar>, py::arg("dt"), py::arg("input"))
       .def("update", &update<Scalar>, py::arg("z"), py::arg("sensor"), py::arg("place"),
            py::arg("age_s"))

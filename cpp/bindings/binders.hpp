@@ -30,6 +30,7 @@ void bind_random(py::module_& m);
 void bind_kernels(py::module_& m);
 void bind_intervals(py::module_& m);
 void bind_filters(py::module_& m);
+void bind_function_models(py::module_& m);
 void bind_cooperative(py::module_& m);
 void bind_tracking(py::module_& m);
 void bind_slat(py::module_& m);

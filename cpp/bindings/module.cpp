@@ -10,6 +10,7 @@ PYBIND11_MODULE(_core, m) {
   bind_intervals(m);
   bind_kernels(m);
   bind_filters(m);
+  bind_function_models(m);
   bind_tracking(m);
   bind_slat(m);
   bind_cooperative(m);

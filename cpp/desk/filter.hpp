@@ -83,6 +83,7 @@ template <class Scalar>
 class AnyFilter {
  public:
   virtual ~AnyFilter() = default;
+  virtual std::unique_ptr<AnyFilter> clone() const = 0;
 
   virtual int states() const = 0;
   virtual int inputs() const = 0;
@@ -156,6 +157,10 @@ class FilterFor final : public AnyFilter<Scalar> {
         memory_(filter_, Events(options.late_s)) {}
 
   const Adaptive& filter() const { return filter_; }
+
+  std::unique_ptr<AnyFilter<Scalar>> clone() const override {
+    return std::unique_ptr<AnyFilter<Scalar>>(new FilterFor(*this));
+  }
 
   int states() const override { return N; }
   int inputs() const override { return filter_.process().model->inputs; }

@@ -170,7 +170,9 @@ class ProcessOf final : public ProcessFor<typename Process::Scalar, Process::kSt
   using Base = ProcessFor<Scalar, kStates>;
   using typename Base::Input;
 
-  explicit ProcessOf(const Process& process) : Base(kInputs), process_(process) {}
+  /// `inputs`: how many of the numbers of the model's input count.
+  explicit ProcessOf(const Process& process, int inputs = kInputs)
+      : Base(inputs), process_(process) {}
 
   const Process& process() const { return process_; }
 
@@ -197,9 +199,9 @@ class ProcessOf final : public ProcessFor<typename Process::Scalar, Process::kSt
   template <int>
   struct Inputs {};
 
-  static Input to_input(const Scalar* values) {
+  Input to_input(const Scalar* values) const {
     Input input = Input::Zero();
-    for (int i = 0; i < kInputs; ++i) input(i) = values[i];
+    for (int i = 0; i < this->inputs; ++i) input(i) = values[i];
     return input;
   }
   static typename Process::State to_state(const Scalar* values) {

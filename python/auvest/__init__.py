@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from auvest.errors import FilterError as FilterError
     from auvest.filters import Aukf as Aukf
     from auvest.filters import Ekf as Ekf
+    from auvest.filters import Report as Report
+    from auvest.filters import RobustEkf as RobustEkf
+    from auvest.filters import RobustUkf as RobustUkf
     from auvest.filters import RunResult as RunResult
     from auvest.filters import Ukf as Ukf
     from auvest.intervals import CovarianceBudget as CovarianceBudget
@@ -34,14 +37,14 @@ if TYPE_CHECKING:
     from auvest.kernels import RejectionStreak as RejectionStreak
     from auvest.kernels import Unit as Unit
     from auvest.models import ConstantAcceleration as ConstantAcceleration
+    from auvest.models import FunctionProcess as FunctionProcess
+    from auvest.models import FunctionSensor as FunctionSensor
     from auvest.models import LeaderRange as LeaderRange
+    from auvest.models import MeasurementModel as MeasurementModel
     from auvest.models import Odometry as Odometry
+    from auvest.models import ProcessModel as ProcessModel
     from auvest.models import RangeBearing as RangeBearing
     from auvest.models import SpeedHeading as SpeedHeading
-    from auvest.robust_filters import RobustEkf as RobustEkf
-    from auvest.robust_filters import RobustReport as RobustReport
-    from auvest.robust_filters import RobustRunResult as RobustRunResult
-    from auvest.robust_filters import RobustUkf as RobustUkf
     from auvest.slat import UNKNOWN_MASTER as UNKNOWN_MASTER
     from auvest.slat import DeadReckoning as DeadReckoning
     from auvest.slat import EkfSlat as EkfSlat
@@ -75,21 +78,24 @@ else:
         "EkfSlat": "slat",
         "FilterError": "errors",
         "FixedInterval": "intervals",
+        "FunctionProcess": "models",
+        "FunctionSensor": "models",
         "Hampel": "kernels",
         "Huber": "kernels",
         "Igg": "kernels",
         "Imm": "slat_models",
         "LeaderRange": "models",
         "MahalanobisInterval": "intervals",
+        "MeasurementModel": "models",
         "Odometry": "models",
         "Outage": "slat",
         "PiecewiseAcceleration": "slat_models",
+        "ProcessModel": "models",
         "RangeBearing": "models",
         "RejectionStreak": "kernels",
-        "RobustEkf": "robust_filters",
-        "RobustReport": "robust_filters",
-        "RobustRunResult": "robust_filters",
-        "RobustUkf": "robust_filters",
+        "Report": "filters",
+        "RobustEkf": "filters",
+        "RobustUkf": "filters",
         "RunResult": "filters",
         "SelfTestPart": "_core",
         "SelfTestResult": "_core",

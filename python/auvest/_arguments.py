@@ -158,24 +158,24 @@ def as_covariance(name: str, value: npt.ArrayLike, states: int, dtype: DType) ->
     return array
 
 
-def as_step(dt: object, dtype: DType) -> float:
+def as_step(dt: object, dtype: DType, name: str = "dt") -> float:
     """Take a time step, s, that this precision can hold."""
-    step = as_number("dt", dt, "not negative")
+    step = as_number(name, dt, "not negative")
     if step > float(np.finfo(dtype).max):
-        raise ValueError(f"dt = {step} is beyond the range of {dtype.name}")
+        raise ValueError(f"{name} = {step} is beyond the range of {dtype.name}")
     return step
 
 
-def as_steps(dt: npt.ArrayLike, rows: int, dtype: DType) -> Floats:
-    """Take the times between rows, s: one for all or one each."""
+def as_steps(dt: npt.ArrayLike, rows: int, dtype: DType, name: str = "dt") -> Floats:
+    """Take times per row, s: one for all or one each."""
     if np.isscalar(dt) or (isinstance(dt, np.ndarray) and dt.ndim == 0):
-        return np.full(rows, as_step(dt, dtype), dtype)
-    steps = as_array("dt", dt, (None,), dtype)
+        return np.full(rows, as_step(dt, dtype, name), dtype)
+    steps = as_array(name, dt, (None,), dtype)
     if len(steps) != rows:
-        raise ValueError(f"dt has {len(steps)} rows and z has {rows}; they must have the same")
+        raise ValueError(f"{name} has {len(steps)} rows and z has {rows}; they must have the same")
     if (steps < 0).any():
         k = int(np.argmax(steps < 0))
-        raise ValueError(f"dt[{k}] must not be negative, not {steps[k]}")
+        raise ValueError(f"{name}[{k}] must not be negative, not {steps[k]}")
     return steps
 
 

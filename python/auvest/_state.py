@@ -98,7 +98,12 @@ def unpack(state: object, kind: str, description: Description) -> dict[str, npt.
 
 
 def describe(value: Any) -> Any:
-    """Say in JSON what a model is: a dataclass becomes its class and its fields, by name."""
+    """Say in JSON what a model is: a dataclass becomes its class and its fields, by name.
+
+    What has a method ``description`` says so itself, or raises ValueError.
+    """
+    if hasattr(value, "description"):
+        return value.description()
     if is_dataclass(value) and not isinstance(value, type):
         parts = {field.name: describe(getattr(value, field.name)) for field in fields(value)}
         return {"class": type(value).__name__, **parts}

@@ -24,18 +24,27 @@ class FilterError(ValueError):
     """
 
     def __init__(
-        self, action: str, status: Status, *, step: int | None = None, partial: Any = None
+        self,
+        action: str,
+        status: Status,
+        *,
+        step: int | None = None,
+        partial: Any = None,
+        hint: str = "",
     ) -> None:
         where = "" if step is None else f" at row {step}"
-        super().__init__(f"{action}{where}: {describe(status)}")
+        super().__init__(f"{action}{where}: {hint or describe(status)}")
+        self.hint = hint
         self.action = action
         self.status = status
         self.step = step
         self.partial = partial
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _rebuild, (self.action, self.status, self.step, self.partial)
+        return _rebuild, (self.action, self.status, self.step, self.partial, self.hint)
 
 
-def _rebuild(action: str, status: Status, step: int | None, partial: Any) -> FilterError:
-    return FilterError(action, status, step=step, partial=partial)
+def _rebuild(
+    action: str, status: Status, step: int | None, partial: Any, hint: str
+) -> FilterError:
+    return FilterError(action, status, step=step, partial=partial, hint=hint)

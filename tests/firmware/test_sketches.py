@@ -64,7 +64,7 @@ def test_first_steps(compiled, text):
         np.float32([3, 4, 0.1, 0.2, 0, 0]),
         np.float32(0.01) * np.eye(6),
         process=ConstantAcceleration(discretisation="euler"),
-        measurement=RangeBearing(),
+        sensors=RangeBearing(),
         alpha=1.0,
         dtype="float32",
     )

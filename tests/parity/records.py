@@ -74,7 +74,7 @@ class Record:
         default_factory=lambda: np.diag([0.01, 0.01, 0.01, 0.01, 0.001, 0.001]).astype(np.float32)
     )
     process: ConstantAcceleration = field(default_factory=ConstantAcceleration)
-    measurement: RangeBearing = field(default_factory=RangeBearing)
+    sensor: RangeBearing = field(default_factory=RangeBearing)
     policy: IntervalPolicy = field(default_factory=MahalanobisInterval)
     alpha: float = 1e-6
     beta: float = 2.0
@@ -87,14 +87,9 @@ class Record:
 
     def to_bytes(self) -> bytes:
         """The record as the replay programs read it."""
-        process = asdict(self.process)
-        discretisation = process.pop("discretisation")
-        measurement = asdict(self.measurement)
-        station = measurement.pop("station")
-        measurement.update(station_x_m=station[0], station_y_m=station[1])
         policy = asdict(self.policy)
         policy.pop("preset", None)
-        kind = _KINDS["ekf" if self.kind == "ekf" else "ukf", discretisation]
+        kind = _KINDS["ekf" if self.kind == "ekf" else "ukf", self.process.discretisation]
         # Parameters travel in the order in which the core names them.
         defaults = {
             FixedInterval: _core.fixed_interval_defaults(),
@@ -104,8 +99,8 @@ class Record:
         parts = [
             np.array([kind, len(self.steps)], "<u4"),
             _in_order(self.points, _core.sigma_points_defaults()),
-            _in_order(process, _core.constant_acceleration_defaults()),
-            _in_order(measurement, _core.range_bearing_defaults()),
+            self.process.values("float32"),
+            self.sensor.values("float32"),
             np.array([_POLICIES[type(self.policy)]], "<u4"),
             _in_order(policy, defaults),
             np.array(self.x0, "<f4"),
@@ -172,7 +167,7 @@ def simulated(name: str, prototype: Aukf, scenario: Scenario) -> Record:
         x0=tuple(float(v) for v in prototype.x),
         P0=prototype.P,
         process=prototype.process,
-        measurement=prototype.measurement,
+        sensor=prototype.sensors["RangeBearing"],
         policy=prototype.policy,
         **{name: getattr(prototype, name) for name in ("alpha", "beta", "kappa")},
     )
@@ -283,7 +278,7 @@ def on_the_station(kind) -> Record:
         make_steps(z, reference=np.full((6, 2), 0.3) if kind == "aukf" else None, dt=0.1),
         kind=kind,
         x0=(0.2, 2.0, 0.0, 0.0, 0.0, 0.0),
-        measurement=RangeBearing(near_field=0.0),
+        sensor=RangeBearing(near_field=0.0),
         policy=MahalanobisInterval() if kind == "aukf" else FixedInterval(),
     )
 
@@ -337,7 +332,7 @@ def scaled(kind, scale) -> Record:
         x0=tuple(scale * v for v in (3.0, -1.0, 0.1, 0.2, 0.0, 0.0)),
         P0=np.diag(variances).astype(np.float32),
         process=process,
-        measurement=RangeBearing(station=(0.0, 0.0), sigma_range_m=sigma_range_m),
+        sensor=RangeBearing(station=(0.0, 0.0), sigma_range_m=sigma_range_m),
         policy=MahalanobisInterval() if kind == "aukf" else FixedInterval(),
         alpha=1e-3,
     )

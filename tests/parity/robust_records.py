@@ -119,12 +119,8 @@ class RobustRecord:
                     row["decision"], row["iterations"] = int(r.decision), r.iterations
                     row["recovered"] = r.recovered
             row["x"], row["P"] = bits(f.x), bits(f.P[lower])
-            count, variance, recent = f.save()["recovery"]
-            row["count"], row["variance"], row["recent"] = (
-                count,
-                bits(variance),
-                bits(recent).ravel(),
-            )
+            count, variance, *recent = f._filter.save()[0]["recovery"]
+            row["count"], row["variance"], row["recent"] = count, bits(variance), bits(recent)
         return trace
 
     def _sensor(self, step: np.void) -> LeaderRange:

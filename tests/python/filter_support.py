@@ -8,6 +8,8 @@ import auvest
 
 STATION = (0.2, 2.0)
 FILTERS = (auvest.Ekf, auvest.Ukf, auvest.Aukf)
+#: The models of the AUKF's paper, which is all that the AUKF has as a default.
+PAPER = {"process": auvest.ConstantAcceleration(), "sensors": auvest.RangeBearing()}
 DTYPES = ("float32", "float64")
 
 
@@ -31,7 +33,7 @@ def make(kind, dtype="float64", **options):
     x0 = [3.0, -1.0, 0.1, 0.2, 0.0, 0.0]
     p0 = np.diag([0.04, 0.04, 0.01, 0.01, 1e-4, 1e-4])
     p0[0, 2] = p0[2, 0] = 0.005
-    return kind(x0, p0, dtype=dtype, **options)
+    return kind(x0, p0, dtype=dtype, **{**PAPER, **options})
 
 
 def same_bits(a, b):

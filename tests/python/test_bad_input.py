@@ -121,7 +121,7 @@ CONSTRUCTORS = {
         TypeError,
         r"process must be an auvest\.ConstantAcceleration, not str",
     ),
-    "measurement": (ukf(measurement=None), TypeError, r"must be an auvest\.RangeBearing, not None"),
+    "measurement": (ukf(sensors=None), TypeError, r"must be an auvest\.RangeBearing, not None"),
     "policy": (
         lambda: auvest.Aukf(X0, P0, policy=0.5),
         TypeError,
@@ -179,7 +179,7 @@ CONSTRUCTORS = {
         r"sigma_bearing_rad must be positive, not -0\.01",
     ),
     "sigma in float32": (
-        ukf(measurement=auvest.RangeBearing(sigma_range_m=1e-25), dtype="float32"),
+        ukf(sensors=auvest.RangeBearing(sigma_range_m=1e-25), dtype="float32"),
         ValueError,
         "sigma_range_m = 1e-25 does not suit float32: the square of sigma_range_m",
     ),
@@ -340,7 +340,7 @@ CALLS = {
     ),
     "run dt complex": (lambda f: f.run(Z, dt=1j), TypeError, "dt must be a number, not complex"),
     "run station": (
-        lambda f: f.run(Z, dt=0.5, measurement=1),
+        lambda f: f.run(Z, dt=0.5, sensor=1),
         TypeError,
         "measurement must be an",
     ),

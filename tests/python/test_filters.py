@@ -9,6 +9,7 @@ import pytest
 from filter_support import (
     DTYPES,
     FILTERS,
+    PAPER,
     STATION,
     everything,
     make,
@@ -54,7 +55,7 @@ def test_arrays_are_copies(kind):
         getattr(f, name)[...] = 99.0
     assert everything(f) == before
     x0, p0 = np.zeros(6), np.eye(6)
-    g = kind(x0, p0)
+    g = kind(x0, p0, **PAPER)
     x0[:], p0[:] = 7.0, 7.0
     assert (g.x == 0).all()
     assert (np.eye(6) == g.P).all()
@@ -116,12 +117,12 @@ def test_range_bearing_of_one_state_and_of_many():
 
 
 def test_defaults_are_those_of_the_core():
-    model = dataclasses.asdict(auvest.RangeBearing())
-    model["station_x_m"], model["station_y_m"] = model.pop("station")
-    assert model == _core.range_bearing_defaults()
-    process = dataclasses.asdict(auvest.ConstantAcceleration())
-    assert process.pop("discretisation") == "exact"
-    assert process == _core.constant_acceleration_defaults()
+    for kind in auvest.models.SENSORS.values():
+        assert kind().values("float64").tolist() == list(_core.sensor_defaults(kind.__name__).values())
+    for kind in auvest.models.PROCESSES.values():
+        model = kind()
+        defaults = _core.process_defaults(model.core_name)
+        assert model.values("float64").tolist() == list(defaults.values())
     assert dataclasses.asdict(auvest.FixedInterval()) == _core.fixed_interval_defaults()
     assert dataclasses.asdict(auvest.CovarianceBudget()) == _core.covariance_budget_defaults()
     for preset in ("figure3", "table1"):
@@ -151,13 +152,13 @@ def test_two_stations_fix_what_one_sees_badly(kind):
     x0 = [101.0, 1.0, 0, 0, 0, 0]
     p0 = np.diag([25.0, 25.0, 1e-4, 1e-4, 1e-6, 1e-6])
     truth = np.array([100.0, 0.0, 0, 0, 0, 0])
-    f = kind(x0, p0, measurement=first)
+    f = kind(x0, p0, process=PAPER["process"], sensors=first)
     f.update(first.h(truth))
     assert f.P[1, 1] > 16  # 1 / (1 / 5^2 + 1 / 10^2) = 20
     f.update(second.h(truth), second)
     assert np.sqrt(f.P[1, 1]) < 0.06
     assert np.abs(f.x[:2] - truth[:2]).max() < 0.2
-    assert f.measurement == first
+    assert f.sensors == {"RangeBearing": first}
 
 
 def test_float32_rounds_what_float64_does():
@@ -261,7 +262,7 @@ def near_station(case, x0, p0, **options):
     kind, dtype, *alpha = case
     if alpha:
         options["alpha"] = alpha[0]
-    return kind(x0, np.diag(p0), dtype=dtype, **options)
+    return kind(x0, np.diag(p0), dtype=dtype, **{**PAPER, **options})
 
 
 def require_recovery(f, result, truth, sigma):
@@ -288,7 +289,7 @@ def test_start_on_the_station_without_near_field_form(case):
     # near_field = 0 still takes the position form where the bearing has no slope at all.
     sensor = auvest.RangeBearing(near_field=0.0)
     f = near_station(
-        case, [*STATION, 0, 0, 0, 0], [0.01, 0.01, 0.01, 0.01, 1e-4, 1e-4], measurement=sensor
+        case, [*STATION, 0, 0, 0, 0], [0.01, 0.01, 0.01, 0.01, 1e-4, 1e-4], sensors=sensor
     )
     f.update([0.3, 1.0])
     assert f.near_field
@@ -348,7 +349,7 @@ def test_sigma_points_on_both_sides_of_the_station(case, near_field):
         case,
         [0.7, 1.5, 0, 0, 0, 0],
         [25.0, 25.0, 0.04, 0.04, 1e-4, 1e-4],
-        measurement=auvest.RangeBearing(near_field=near_field),
+        sensors=auvest.RangeBearing(near_field=near_field),
     )
     result = f.run(z, dt=0.5)
     require_recovery(f, result, truth, 0.12)

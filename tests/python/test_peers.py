@@ -60,7 +60,7 @@ def test_agrees_with_filterpy(discretisation, kappa):
     )
     peer.x, peer.P = x0.copy(), p0.copy()
     peer.Q, peer.R = process.Q(dt), np.diag([1.0, 0.05**2])
-    ours = auvest.Ukf(x0, p0, process=process, measurement=SENSOR, alpha=1.0, beta=2.0, kappa=kappa)
+    ours = auvest.Ukf(x0, p0, process=process, sensors=SENSOR, alpha=1.0, beta=2.0, kappa=kappa)
 
     for row in z:
         peer.predict()

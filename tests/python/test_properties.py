@@ -62,8 +62,8 @@ def test_turning_the_world_turns_the_estimate(belief, range_m, bearing, turn):
     c, s = np.cos(turn), np.sin(turn)
     rotation = np.kron(np.eye(3), [[c, -s], [s, c]])
     turned = rotation @ P0 @ rotation.T
-    a = auvest.Ekf(x0, P0, measurement=sonar)
-    b = auvest.Ekf(rotation @ x0, (turned + turned.T) / 2, measurement=sonar)
+    a = auvest.Ekf(x0, P0, sensors=sonar)
+    b = auvest.Ekf(rotation @ x0, (turned + turned.T) / 2, sensors=sonar)
     a.update([range_m, bearing])
     b.update([range_m, bearing + turn])
     assume(a.near_field == b.near_field)

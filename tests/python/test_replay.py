@@ -454,7 +454,7 @@ def test_aukf_is_the_filter_step_by_step(tmp_path: Path) -> None:
             velocity_psd=process.velocity_psd,
             acceleration_psd=process.acceleration_psd,
         ),
-        measurement=RangeBearing(station=(2.0, -1.0), sigma_range_m=0.1, sigma_bearing_rad=0.02),
+        sensors=RangeBearing(station=(2.0, -1.0), sigma_range_m=0.1, sigma_bearing_rad=0.02),
         policy=CovarianceBudget(initial_s=0.5, min_s=0.5, max_s=3.0, position_sigma_m=0.4),
         alpha=settings.filter.alpha,
     )

@@ -198,7 +198,7 @@ def test_a_vehicle_that_wanders_leaves_the_truth_and_moves_the_reference():
     sensor = auvest.RangeBearing(sigma_range_m=1e-6, sigma_bearing_rad=1e-6)
     policy = auvest.MahalanobisInterval(scale=0.0, ratio_max=1.0, gamma1_m2=1e-12, max_s=10.0)
     # A small P0: the transform shifts the range by sigma^2 / (2 r).
-    f = auvest.Aukf([3.0, 4.0, 0.1, -0.2, 0, 0], 1e-4 * P0, measurement=sensor, policy=policy)
+    f = auvest.Aukf([3.0, 4.0, 0.1, -0.2, 0, 0], 1e-4 * P0, sensors=sensor, policy=policy)
     track = Track(
         kind="straight",
         position=(3.0, 4.0),
@@ -267,7 +267,7 @@ def test_a_run_that_fails_is_reported_and_keeps_its_rows():
     # float32 cannot square a range of 1e20 m: lognormal noise of that size comes now and then.
     noise = Noise(kind="lognormal", range_m=1e18, bearing_rad=0.01)
     sensor = auvest.RangeBearing(sigma_range_m=1e18)
-    f = ukf(dtype="float32", measurement=sensor)
+    f = ukf(dtype="float32", sensors=sensor)
     result = simulate(f, Scenario(runs=60, steps=200, noise=noise))
     assert 0 < result.failed.sum() < 60
     assert result.failed.tolist() == (result.samples < 200).tolist()

@@ -137,7 +137,7 @@ def test_agrees_with_the_textbook_form(discretisation, alpha):
     root[1, 0], root[2, 0], root[4, 3] = 0.2, 0.1, 0.05
     p0 = root @ root.T
 
-    ukf = auvest.Ukf(x0, p0, process=process, measurement=sensor, alpha=alpha, beta=2.0, kappa=-3.0)
+    ukf = auvest.Ukf(x0, p0, process=process, sensors=sensor, alpha=alpha, beta=2.0, kappa=-3.0)
     with mp.workdps(60):
         book = Textbook(x0, p0, process, sensor, alpha, 2.0, -3.0)
         for row in z:

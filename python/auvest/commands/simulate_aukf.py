@@ -232,11 +232,11 @@ def command(
     with terminal.writing(output):
         files = {
             "per_step": write_csv(output / "per_step.csv", per_step),
-            "one_run": write_csv(output / "one_run.csv", one_run(result, filter_.measurement)),
+            "one_run": write_csv(output / "one_run.csv", one_run(result, filter_.sensors["RangeBearing"])),
         }
         if not no_figure:
             files["figure"] = _draw(
-                output / "figure.png", result, filter_.measurement, filter_name, policy
+                output / "figure.png", result, filter_.sensors["RangeBearing"], filter_name, policy
             )
         document = {
             "command": "simulate aukf",

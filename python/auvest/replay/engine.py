@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from auvest._arguments import Floats
-from auvest.filters import Aukf
+from auvest.filters import Aukf, Ekf, RunResult, Ukf
 from auvest.intervals import CovarianceBudget, FixedInterval, IntervalPolicy, MahalanobisInterval
 from auvest.kernels import RejectionStreak
 from auvest.logs import LogError, LogFolder, Stream, merge
@@ -30,7 +30,6 @@ from auvest.replay.motion import Motion, carry, dead_reckon
 from auvest.replay.sources import Sources
 from auvest.replay.tables import Batch, Columns
 from auvest.replay.thinning import SAME_S, Thinning
-from auvest.robust_filters import RobustEkf, RobustRunResult, RobustUkf
 
 #: Velocity odometry is gone through in small steps: so many at once, so that memory stays bounded.
 _STEPS = 32768
@@ -216,7 +215,7 @@ class Localiser(Replay):
                 sigma_drift=noise.sigma_drift,
                 sigma_turn=noise.sigma_turn,
             ),
-            "measurement": self._sensor,
+            "sensors": self._sensor,
         }
         sigmas = [start.sigma_position_m, start.sigma_position_m, start.sigma_heading_rad]
         x0, P0 = np.array([x, y, heading]), np.diag(sigmas) ** 2
@@ -348,9 +347,9 @@ class Localiser(Replay):
             result = self._filter.run(
                 z[part],
                 dt=dt[part],
-                motion=motion[part],
-                position=place[part, :2],
-                measurement=sensor,
+                input=motion[part],
+                place=place[part, :2],
+                sensor=sensor,
             )
             results.append(result)
         return (
@@ -402,11 +401,11 @@ class Tracker(Replay):
         sigmas = [s.sigma_position_m, s.sigma_speed_m_s, s.sigma_acceleration_m_s2]
         x0 = np.array([*position, 0.0, 0.0, 0.0, 0.0])
         P0 = np.diag(np.repeat(sigmas, 2)) ** 2
-        models: dict[str, Any] = {"process": self._process, "measurement": self._sensor}
+        models: dict[str, Any] = {"process": self._process, "sensors": self._sensor}
         if self.filter_name == "aukf":
             policy = interval_policy(self.settings.interval)
             alpha = self.settings.filter.alpha
-            self._filter: RobustEkf | RobustUkf | Aukf = Aukf(
+            self._filter: Ekf | Ukf = Aukf(
                 x0, P0, policy=policy, alpha=alpha, **models
             )
         else:
@@ -457,7 +456,7 @@ class Tracker(Replay):
 
     def _fuse(
         self,
-        tracker: RobustEkf | RobustUkf,
+        tracker: Ekf | Ukf,
         fixes: Rows,
         places: Rows,
         used: npt.NDArray[np.bool_],
@@ -467,7 +466,7 @@ class Tracker(Replay):
         if len(fixes) == 0:
             return np.empty((0, 6)), np.empty((0, 6, 6))
         dt = np.diff(fixes[:, 0], prepend=self._now)
-        result = tracker.run(fixes[:, 2:4], dt=dt, position=places[:, :2])
+        result = tracker.run(fixes[:, 2:4], dt=dt, place=places[:, :2])
         _fill(columns, np.flatnonzero(used), updates_of([result]))
         return result.x, result.P
 
@@ -490,7 +489,7 @@ class Tracker(Replay):
                 continue
             station = (float(places[k, 0]), float(places[k, 1]))
             tracker.predict(fixes[k, 0] - now)
-            tracker.update(fixes[k, 2:4], replace(self._sensor, station=station))
+            tracker.update(fixes[k, 2:4], place=station)
             tracker.feedback()
             now, used[k] = float(fixes[k, 0]), True
             states.append(tracker.x[None])
@@ -515,14 +514,14 @@ class Tracker(Replay):
 
 def _build(
     name: FilterName, settings: Settings, x0: Rows, P0: Rows, models: dict[str, Any]
-) -> RobustEkf | RobustUkf:
-    """Make a filter; a plain one is the robust one with the kernel that doubts nothing."""
+) -> Ekf | Ukf:
+    """Make a filter, robust if its name says so."""
     robust = name.startswith("robust")
-    models["kernel"] = settings.filter.kernel if robust else "unit"
-    models["recovery"] = RejectionStreak() if robust else None
+    if robust:
+        models["kernel"], models["recovery"] = settings.filter.kernel, RejectionStreak()
     if name.endswith("ukf"):
-        return RobustUkf(x0, P0, alpha=settings.filter.alpha, **models)
-    return RobustEkf(x0, P0, **models)
+        return Ukf(x0, P0, alpha=settings.filter.alpha, **models)
+    return Ekf(x0, P0, **models)
 
 
 def interval_policy(settings: IntervalSettings) -> IntervalPolicy:
@@ -536,7 +535,7 @@ def interval_policy(settings: IntervalSettings) -> IntervalPolicy:
     return CovarianceBudget(initial_s=low, min_s=low, max_s=high, position_sigma_m=sigma)
 
 
-def updates_of(results: list[RobustRunResult]) -> dict[str, npt.NDArray[Any]]:
+def updates_of(results: list[RunResult]) -> dict[str, npt.NDArray[Any]]:
     """Gather what the updates in these results reported, a row per measurement."""
     columns: dict[str, npt.NDArray[Any]] = {}
     there = np.concatenate([~np.isnan(result.nis) for result in results])

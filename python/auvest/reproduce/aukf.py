@@ -554,4 +554,4 @@ def _track_table(result: TrackingResult, run: int = 0) -> dict[str, Floats]:
 
 def paper_station() -> tuple[float, float]:
     """Position of the base station, m: Table 1."""
-    return paper_filter("ukf", noise=paper_noise()).measurement.station
+    return paper_filter("ukf", noise=paper_noise()).sensors["RangeBearing"].station

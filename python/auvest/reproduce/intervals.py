@@ -223,7 +223,7 @@ def _filter(track: Track, policy: IntervalPolicy) -> Aukf:
         np.array(track.start),
         np.diag(np.repeat(np.square(P0_SIGMA), 2)),
         process=ConstantAcceleration(),
-        measurement=RangeBearing(sigma_range_m=NOISE_SIGMA[0], sigma_bearing_rad=NOISE_SIGMA[1]),
+        sensors=RangeBearing(sigma_range_m=NOISE_SIGMA[0], sigma_bearing_rad=NOISE_SIGMA[1]),
         policy=policy,
         alpha=1e-3,
     )

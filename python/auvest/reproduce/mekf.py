@@ -319,7 +319,7 @@ def driven(q_factor: float, r_factor: float, *, runs: int, seed: int) -> matched
     process = ConstantAcceleration(**{k: q_factor * v for k, v in psd.items()})  # type: ignore[arg-type]
     sensor = RangeBearing(**{k: r_factor**0.5 * v for k, v in sigma.items()})
     return matched.simulate(
-        lambda x0, p0: Aukf(x0, p0, process=process, measurement=sensor),
+        lambda x0, p0: Aukf(x0, p0, process=process, sensors=sensor),
         ConstantAcceleration(**psd),  # type: ignore[arg-type]
         RangeBearing(**sigma),  # type: ignore[arg-type]
         x0=[30.0, 10.0, 0.2, 0.1, 0.0, 0.0],

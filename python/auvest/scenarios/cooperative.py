@@ -24,9 +24,9 @@ from auvest._arguments import (
     as_pair,
 )
 from auvest._core import Status
+from auvest.filters import Ekf, RobustEkf, RobustUkf, Ukf
 from auvest.kernels import Kernel, KernelName, RejectionStreak
-from auvest.models import LeaderRange, SpeedHeading, core_sensor
-from auvest.robust_filters import RobustEkf, RobustUkf
+from auvest.models import LeaderRange, SpeedHeading
 
 _DEFAULTS = _core.cooperative_defaults()
 _STREAK = RejectionStreak()
@@ -269,7 +269,7 @@ def slave_filter(
         process=SpeedHeading(
             sigma_forward=q * _DEFAULTS["sigma_speed"], sigma_heading=q * _DEFAULTS["sigma_heading"]
         ),
-        measurement=LeaderRange(sigma_range_m=r * sigma_range_m),
+        sensors=LeaderRange(sigma_range_m=r * sigma_range_m),
         kernel=kernel,
         recovery=recovery,
         residual=residual,
@@ -281,7 +281,7 @@ _SCENARIO = Scenario()
 
 
 def simulate(
-    filter: RobustEkf | RobustUkf,  # noqa: A002 (its name in this package)
+    filter: Ekf | Ukf,  # noqa: A002 (its name in this package)
     scenario: Scenario = _SCENARIO,
     *,
     workers: int | None = None,
@@ -291,7 +291,7 @@ def simulate(
 
     Parameters
     ----------
-    filter : RobustEkf or RobustUkf
+    filter : Ekf or Ukf
         The prototype, with :class:`auvest.SpeedHeading` of two states and a
         :class:`auvest.LeaderRange`: its models, kernel and belief are the start of every run. It is
         not changed. Its noise need not be the true noise.
@@ -311,14 +311,16 @@ def simulate(
     ValueError, TypeError
         If an argument is wrong.
     """
-    as_instance("filter", filter, (RobustEkf, RobustUkf))
+    as_instance("filter", filter, (Ekf, Ukf))
     as_instance("scenario", scenario, Scenario)
     if not isinstance(filter.process, SpeedHeading) or len(filter.x) != 2:
         raise ValueError(f"filter must have a SpeedHeading of two states, not {filter.process}")
-    if not isinstance(filter.measurement, LeaderRange):
-        raise ValueError(f"filter must measure a LeaderRange, not {filter.measurement}")
-    core = filter._prototype()
-    sensor = core_sensor(filter.measurement, filter.dtype.name)
+    sensors = list(filter.sensors.values())
+    if len(sensors) != 1 or not isinstance(sensors[0], LeaderRange):
+        raise ValueError(f"filter must have one LeaderRange as its sensor, not {sensors}")
+    core = filter._core_filter(None)
+    sensor = sensors[0].core(2, filter.dtype)
+    core.reset(filter.x, filter.P, filter.x)
 
     def part(first: int, count: int) -> dict[str, npt.NDArray[Any]]:
         return _core.cooperate(core, sensor, _as_core(scenario, first, count))

@@ -39,7 +39,7 @@ class Errors:
 def simulate(
     make: Callable[[npt.NDArray[np.float64], npt.NDArray[np.float64]], Ekf | Ukf | Aukf],
     process: ConstantAcceleration,
-    measurement: RangeBearing,
+    sensor: RangeBearing,
     *,
     x0: npt.ArrayLike,
     P0: npt.ArrayLike,
@@ -56,7 +56,7 @@ def simulate(
     make : callable
         ``make(x0, P0)`` gives a fresh filter. An :class:`auvest.Aukf` is sampled at the intervals
         that it chooses, without a reference.
-    process, measurement
+    process, sensor
         The world's.
     x0, P0 : array_like, shapes (6,) and (6, 6)
         The true start is drawn from their Gaussian.
@@ -68,11 +68,11 @@ def simulate(
         Called after each run.
     """
     as_instance("process", process, ConstantAcceleration)
-    as_instance("measurement", measurement, RangeBearing)
+    as_instance("sensor", sensor, RangeBearing)
     steps, runs = as_integer("steps", steps, 1, 10**6), as_integer("runs", runs, 1, 10**6)
     mean, covariance = np.asarray(x0, np.float64), np.asarray(P0, np.float64)
     start_root = np.linalg.cholesky(covariance)
-    sigma = np.array([measurement.sigma_range_m, measurement.sigma_bearing_rad])
+    sigma = np.array([sensor.sigma_range_m, sensor.sigma_bearing_rad])
     error = np.empty((runs, steps, 6))
     p = np.empty((runs, steps, 6, 6))
     nis = np.empty((runs, steps))
@@ -84,7 +84,7 @@ def simulate(
             dt = filter_.interval if isinstance(filter_, Aukf) else interval_s
             root = np.linalg.cholesky(process.Q(dt))
             truth = process.Phi(dt) @ truth + root @ rng.standard_normal(6)
-            z = measurement.h(truth) + sigma * rng.standard_normal(2)
+            z = sensor.h(truth) + sigma * rng.standard_normal(2)
             filter_.predict(dt)
             filter_.update(z)
             if isinstance(filter_, Aukf):

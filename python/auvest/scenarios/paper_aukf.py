@@ -135,17 +135,17 @@ def paper_filter(
     P0 = np.diag(np.repeat(np.square(p0_sigma), 2))
     process = ConstantAcceleration(discretisation="euler" if track == "paper" else "exact")
     sigma_range_m, sigma_bearing_rad = noise.standard_deviation
-    measurement = RangeBearing(sigma_range_m=sigma_range_m, sigma_bearing_rad=sigma_bearing_rad)
+    sensor = RangeBearing(sigma_range_m=sigma_range_m, sigma_bearing_rad=sigma_bearing_rad)
     if name == "ekf":
-        return Ekf(x0, P0, process=process, measurement=measurement, dtype=dtype)
+        return Ekf(x0, P0, process=process, sensors=sensor, dtype=dtype)
     points = {"alpha": alpha, "beta": beta, "kappa": kappa}
     if name == "ukf":
-        return Ukf(x0, P0, process=process, measurement=measurement, dtype=dtype, **points)
+        return Ukf(x0, P0, process=process, sensors=sensor, dtype=dtype, **points)
     return Aukf(
         x0,
         P0,
         process=process,
-        measurement=measurement,
+        sensors=sensor,
         policy=MahalanobisInterval() if policy is None else policy,
         dtype=dtype,
         **points,

@@ -24,11 +24,12 @@ from auvest._arguments import (
     as_pair,
 )
 from auvest._core import Status
-from auvest.filters import Aukf, Ekf, Ukf
+from auvest.filters import Ekf, Ukf
 from auvest.intervals import FixedInterval
+from auvest.models import ConstantAcceleration, RangeBearing
 
 if TYPE_CHECKING:
-    from auvest._core import _ScenarioDict
+    from auvest._core import _ScenarioDict, _Sensor
 
 _TRACK = _core.track_defaults()
 _NOISE = _core.noise_defaults()
@@ -306,7 +307,7 @@ class TrackingResult:
 
 
 def simulate(
-    filter: Ekf | Ukf | Aukf,  # noqa: A002 (its name in this package)
+    filter: Ekf | Ukf,  # noqa: A002 (its name in this package)
     scenario: Scenario = _SCENARIO,
     *,
     workers: int | None = None,
@@ -316,8 +317,8 @@ def simulate(
 
     Parameters
     ----------
-    filter : Ekf, Ukf or Aukf
-        The prototype: its models, parameters and belief (``x``, ``P``) are the start of every run.
+    filter : Ekf or Ukf
+        The prototype, with any kernel and interval policy: its models, parameters and belief (``x``, ``P``) are the start of every run.
         It is not changed. Its station is the true station; its noise need not be the true noise.
     scenario : Scenario
         Track, noise, number of runs and so on.
@@ -337,15 +338,15 @@ def simulate(
     ValueError, TypeError
         If an argument is wrong.
     """
-    as_instance("filter", filter, (Ekf, Ukf, Aukf))
+    as_instance("filter", filter, (Ekf, Ukf))
     as_instance("scenario", scenario, Scenario)
-    policy = (
-        filter.policy if isinstance(filter, Aukf) else FixedInterval(interval_s=scenario.interval_s)
-    )
-    core, x0, p0, sensor = filter._prototype(policy)
+    policy = filter.policy or FixedInterval(interval_s=scenario.interval_s)
+    core, sensor, x0, p0 = filter._core_filter(policy), station(filter), filter.x, filter.P
 
     def part(first: int, count: int) -> dict[str, npt.NDArray[Any]]:
-        return core.simulate(x0, p0, sensor, _as_core(scenario, first, count))
+        return _core.simulate_tracking(
+            core, x0, p0, sensor, _as_core(scenario, first, count)
+        )
 
     try:
         columns = montecarlo.run(
@@ -360,6 +361,22 @@ def simulate(
             stop.partial = TrackingResult(**stop.partial, scenario=scenario)
         raise
     return TrackingResult(**columns, scenario=scenario)
+
+
+def station(filter: Ekf | Ukf) -> _Sensor[Any]:  # noqa: A002 (its name in this package)
+    """Give the core's sensor of a filter whose only sensor is a range and bearing.
+
+    Raises
+    ------
+    ValueError
+        If it has another process or other sensors.
+    """
+    sensors = list(filter.sensors.values())
+    if not isinstance(filter.process, ConstantAcceleration):
+        raise ValueError(f"filter must have a ConstantAcceleration, not {filter.process}")
+    if len(sensors) != 1 or not isinstance(sensors[0], RangeBearing):
+        raise ValueError(f"filter must have one RangeBearing as its sensor, not {sensors}")
+    return sensors[0].core(6, filter.dtype)
 
 
 def _as_core(scenario: Scenario, first: int, count: int) -> _ScenarioDict:

@@ -1,0 +1,742 @@
+"""The frame of the filters: arguments, steps, records, state. The estimation is all C++.
+
+Single steps call the core at once; it reads arguments in their usual forms. What it does not
+understand comes back here, to be converted or refused in words.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NoReturn, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from auvest import _core
+from auvest._arguments import (
+    DType,
+    Floats,
+    as_array,
+    as_covariance,
+    as_dtype,
+    as_flag,
+    as_instance,
+    as_integer,
+    as_kind,
+    as_number,
+    as_step,
+    as_steps,
+    require_range,
+)
+from auvest._core import Decision, Status
+from auvest._state import describe, pack, unpack
+from auvest.errors import FilterError
+from auvest.filters.results import Report, RunResult
+from auvest.intervals import FixedInterval, IntervalPolicy, MahalanobisInterval, core_interval
+from auvest.kernels import Kernel, KernelName, RejectionStreak, Unit, as_kernel, core_kernel
+from auvest.models import MeasurementModel, ProcessModel, from_description
+from auvest.models._base import UNSAVED
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+    from auvest._core import _Filter, _Sensor
+
+Residual: TypeAlias = Literal["innovation", "post-fit"]
+Sensors: TypeAlias = MeasurementModel | Sequence[MeasurementModel] | Mapping[str, MeasurementModel]
+
+_UPDATE = _core.robust_update_defaults()
+_FIXED = FixedInterval()
+_UNIT = Unit()
+_REPORT = ("innovation", "S", "standardised", "weight")
+
+
+class GaussianFilter:
+    """What :class:`Ekf`, :class:`Ukf` and their presets have in common; not for direct use.
+
+    One filter belongs to one thread at a time: a call while another thread is inside raises
+    ``RuntimeError``. Use a copy (``copy.deepcopy``) per thread.
+    """
+
+    #: How the core linearises: its number in ``AnyLinearisation``.
+    _linearisation: ClassVar[int]
+
+    def __init__(
+        self,
+        x0: npt.ArrayLike,
+        P0: npt.ArrayLike,
+        *,
+        process: ProcessModel,
+        sensors: Sensors = (),
+        kernel: Kernel | KernelName | None = None,
+        recovery: RejectionStreak | None = None,
+        policy: IntervalPolicy | None = None,
+        late_s: float = 0.0,
+        residual: Residual = "innovation",
+        max_iterations: int = _UPDATE["max_iterations"],
+        tolerance: float = _UPDATE["tolerance"],
+        reference: npt.ArrayLike | None = None,
+        dtype: npt.DTypeLike = "float64",
+        parameters: dict[str, float] | None = None,
+    ) -> None:
+        self._dtype = as_dtype(dtype)
+        self._process: ProcessModel = as_instance("process", process, ProcessModel)
+        self._sensors = _as_sensors(sensors, self._process)
+        self._kernel = None if kernel is None else as_kernel(kernel)
+        if recovery is not None:
+            as_instance("recovery", recovery, RejectionStreak)
+            if kernel is None:
+                raise ValueError(
+                    "recovery is for filters with a kernel: without one nothing is ever rejected"
+                )
+        self._recovery = recovery
+        if policy is not None:
+            as_instance("policy", policy, IntervalPolicy.__args__)  # type: ignore[attr-defined]
+        self._policy = policy
+        self._options = {
+            "late_s": as_number("late_s", late_s, "not negative"),
+            "residual": as_kind("residual", residual, ("innovation", "post-fit")),
+            "max_iterations": as_integer("max_iterations", max_iterations, 2, 255),
+            "tolerance": as_number("tolerance", tolerance, "not negative"),
+        }
+        self._parameters = {} if parameters is None else parameters
+        states = len(self._process.state)
+        state = as_array("x0", x0, (states,), self._dtype)
+        covariance = as_covariance("P0", P0, states, self._dtype)
+        start = state[:2].copy()
+        if reference is not None:
+            start = as_array("reference", reference, (2,), self._dtype)
+        self._build()
+        try:
+            self._filter.reset(state, covariance, start)
+        except _core.StatusError as error:
+            if error.status != Status.not_positive_definite:
+                raise ValueError(f"x0 and P0 are refused: {error}") from None
+            smallest = np.linalg.eigvalsh(covariance.astype(np.float64))[0]
+            raise ValueError(
+                f"P0 must be positive definite in {self._dtype.name}, "
+                f"but its smallest eigenvalue is {smallest:.3g}"
+            ) from None
+
+    def _build(self) -> None:
+        self._filter = self._core_filter(self._policy)
+        self._handles = {
+            name: model.core(len(self._process.state), self._dtype)
+            for name, model in self._sensors.items()
+        }
+        self._only = next(iter(self._handles.values())) if len(self._handles) == 1 else None
+
+    def _core_filter(self, policy: IntervalPolicy | None) -> _Filter[Any]:
+        """Make a filter of the core like this one, with the policy given."""
+        name = self._dtype.name
+        numbers = {**self._parameters, "late_s": self._options["late_s"]}
+        require_range(numbers, name)
+        options = {
+            "linearisation": self._linearisation,
+            "points": self._parameters,
+            "rejections": 0 if self._recovery is None else self._recovery.rejections,
+            "post_fit": self._options["residual"] == "post-fit",
+            "max_iterations": self._options["max_iterations"],
+            "tolerance": self._options["tolerance"],
+            "late_s": self._options["late_s"],
+        }
+        try:
+            made: _Filter[Any] = getattr(_core, f"Filter_{name}")(
+                self._process.core(self._dtype),
+                core_kernel(_UNIT if self._kernel is None else self._kernel, name),
+                core_interval(_FIXED if policy is None else policy, name),
+                options,
+            )
+        except _core.StatusError as error:
+            given = {**self._parameters, "tolerance": self._options["tolerance"]}
+            text = ", ".join(f"{key}={value}" for key, value in given.items())
+            raise ValueError(f"{text} do not suit {name}: {error}") from None
+        return made
+
+    # ---- What can be read -----------------------------------------------------------------------
+
+    @property
+    def x(self) -> Floats:
+        """The estimate, shape (n,), a copy; its components are named by ``process.state``."""
+        x: Floats = self._filter.x
+        return x
+
+    @property
+    def P(self) -> Floats:
+        """The covariance of the estimate, shape (n, n), a copy."""
+        p: Floats = self._filter.P
+        return p
+
+    @property
+    def report(self) -> Report | None:
+        """What the last update reported; None before one and if z was missing."""
+        given = self._filter.report
+        return None if given is None else Report(**given)
+
+    @property
+    def innovation(self) -> Floats:
+        """Innovation of the last update, shape (m,); NaN before one and if z was missing.
+
+        A position error (m) if ``near_field``.
+        """
+        return self._last("innovation", 1)
+
+    @property
+    def S(self) -> Floats:
+        """Covariance of the innovation before any weight, shape (m, m); NaN as ``innovation``."""
+        return self._last("S", 2)
+
+    @property
+    def nis(self) -> float:
+        """Normalised innovation squared of the last update; NaN as ``innovation``."""
+        return float(self._filter.nis)
+
+    @property
+    def near_field(self) -> bool:
+        """True if the last update took the measurement as a position (near the station)."""
+        given = self._filter.report
+        return given is not None and bool(given["near_field"])
+
+    @property
+    def status(self) -> Status:
+        """What the core reported last: ``Status.ok`` unless a FilterError was raised."""
+        return self._filter.status
+
+    @property
+    def dtype(self) -> DType:
+        """float32 or float64."""
+        return self._dtype
+
+    @property
+    def process(self) -> ProcessModel:
+        """The process model."""
+        return self._process
+
+    @property
+    def sensors(self) -> dict[str, MeasurementModel]:
+        """The sensors by name; the name of one given without is that of its class."""
+        return dict(self._sensors)
+
+    @property
+    def kernel(self) -> Kernel | None:
+        """The robust kernel; None: every measurement counts fully."""
+        return self._kernel
+
+    @property
+    def recovery(self) -> RejectionStreak | None:
+        """The recovery from lock-out."""
+        return self._recovery
+
+    @property
+    def residual(self) -> Residual:
+        """Which residual the kernel judges."""
+        kind: Residual = self._options["residual"]
+        return kind
+
+    @property
+    def late_s(self) -> float:
+        """How long ago a measurement may have been taken, s."""
+        return float(self._options["late_s"])
+
+    @property
+    def policy(self) -> IntervalPolicy | None:
+        """The interval policy."""
+        return self._policy
+
+    @property
+    def interval(self) -> float:
+        """T(k): time to the next sample, s; only with a policy."""
+        self._require_policy("interval")
+        return float(self._filter.interval)
+
+    @property
+    def tau(self) -> float:
+        """tau(k+1) of [AUKF 12]; only with :class:`MahalanobisInterval`."""
+        return self._law("tau")
+
+    @property
+    def ratio(self) -> float:
+        """M(k) of [AUKF 7]; only with :class:`MahalanobisInterval`."""
+        return self._law("ratio")
+
+    @property
+    def mahalanobis_squared(self) -> float:
+        """d(k)^2 of [AUKF 11]; only with :class:`MahalanobisInterval`."""
+        return self._law("mahalanobis_squared")
+
+    def _law(self, name: str) -> float:
+        law = self._filter.law
+        if law is None or not isinstance(self._policy, MahalanobisInterval):
+            kind = type(self._policy).__name__
+            raise AttributeError(f"{name} belongs to MahalanobisInterval; this filter has {kind}")
+        return float(law[name])
+
+    def _last(self, name: str, axes: int) -> Floats:
+        given = self._filter.report
+        if given is not None:
+            last: Floats = given[name]
+            return last
+        size = self._only.size if self._only is not None else 0
+        return np.full((size,) * axes, np.nan, self._dtype)
+
+    def _require_policy(self, what: str) -> None:
+        if self._policy is None:
+            raise AttributeError(f"{what} needs an interval policy; this filter has none")
+
+    # ---- Steps ----------------------------------------------------------------------------------
+
+    def predict(self, dt: float | None = None, input: npt.ArrayLike | None = None) -> None:
+        """Carry the estimate ``dt >= 0`` seconds forward.
+
+        Parameters
+        ----------
+        dt : float, optional
+            Seconds; default: the ``interval`` that the policy chose.
+        input : array_like, shape (k,)
+            What drove the process in that time, named by ``process.input``; not given for a process
+            without input.
+
+        Raises
+        ------
+        ValueError, TypeError
+            If an argument is wrong.
+        FilterError
+            If the prediction cannot be done. In all cases the filter is unchanged.
+        """
+        if dt is None and self._policy is None:
+            raise TypeError("dt must be a number, not None: this filter has no interval policy")
+        code = self._filter.predict(dt, input)
+        if code == 0:
+            return
+        if code == _core.UNCLEAR:
+            step = None if dt is None else as_step(dt, self._dtype)
+            code = self._filter.predict(step, self._as_input(input))
+        self._require_done(f"predict(dt={dt})", code)
+
+    def update(
+        self,
+        z: npt.ArrayLike | None,
+        sensor: str | MeasurementModel | None = None,
+        *,
+        place: npt.ArrayLike | None = None,
+        age_s: float | None = None,
+    ) -> None:
+        """Correct the estimate by one measurement; ``report`` says what it did.
+
+        Parameters
+        ----------
+        z : float or array_like, shape (m,), or None
+            The numbers that ``sensor.measures`` names. None or NaN throughout: missing, the
+            estimate stays.
+        sensor : str or MeasurementModel, optional
+            What measured: one of ``sensors`` by name, or any other model; needed where the filter
+            has several.
+        place : array_like, shape (2,), optional
+            Where the sensor's station, or the leader that it ranges to, stood, m; default: where
+            the model has it.
+        age_s : float, optional
+            How long ago it was measured, s, at most ``late_s``; default: now.
+
+        Raises
+        ------
+        ValueError, TypeError
+            If an argument is wrong.
+        FilterError
+            If the update cannot be done. In all cases the filter is unchanged.
+        """
+        handle = self._only if sensor is None else self._handle(sensor)
+        if handle is None:
+            handle = self._handle(None)
+        code = self._filter.update(z, handle, place, age_s)
+        if code == 0:
+            return
+        if code == _core.UNCLEAR:
+            given = np.atleast_1d(z) if handle.size == 1 and np.ndim(z) == 0 else z  # type: ignore[arg-type]
+            row = as_array("z", given, (handle.size,), self._dtype, missing=True)
+            there = None if place is None else self._as_place(place, handle)
+            age = 0.0 if age_s is None else as_number("age_s", age_s, "not negative")
+            code = self._filter.update(row, handle, there, age)
+        if code == int(Status.time_backwards):
+            raise FilterError(
+                "update",
+                Status.time_backwards,
+                hint=f"age_s = {age_s} is more than late_s = {self.late_s} or than the filter "
+                "has run",
+            )
+        self._require_done("update", code)
+
+    def feedback(self, reference: npt.ArrayLike | None = None) -> float:
+        """Choose the interval to the next sample, after the update; only with a policy.
+
+        Parameters
+        ----------
+        reference : array_like, shape (2,), optional
+            Desired position now, m; default: the estimate itself.
+
+        Returns
+        -------
+        float
+            ``interval``, s.
+
+        Raises
+        ------
+        ValueError, TypeError
+            If ``reference`` is wrong; the filter is unchanged.
+        """
+        self._require_policy("feedback()")
+        code = self._filter.feedback(reference)
+        if code == _core.UNCLEAR:
+            code = self._filter.feedback(as_array("reference", reference, (2,), self._dtype))
+        self._require_done("feedback", code)
+        return float(self._filter.interval)
+
+    def run(
+        self,
+        z: npt.ArrayLike,
+        *,
+        dt: npt.ArrayLike | None = None,
+        input: npt.ArrayLike | None = None,
+        sensor: str | MeasurementModel | Sequence[str] | None = None,
+        place: npt.ArrayLike | None = None,
+        age_s: npt.ArrayLike | None = None,
+        reference: npt.ArrayLike | None = None,
+        covariance: bool = True,
+    ) -> RunResult:
+        """Predict and update over a record, in C++ and without the GIL.
+
+        Parameters
+        ----------
+        z : array_like, shape (T, m); (T,) where all measurements are one number
+            A measurement per row, those of smaller sensors filled up with NaN. NaN throughout: the
+            measurement is missing and that row only predicts.
+        dt : float or array_like, shape (T,)
+            Time from the row before (or the filter's present) to each row, s, not negative. With a
+            policy the default is the intervals that it chooses; the record must then have been
+            sampled at them.
+        input : array_like, shape (T, k)
+            What drove the process in each of these times, as for :meth:`predict`.
+        sensor : str or MeasurementModel, or sequence of str, length T
+            What measured: one for all rows, or one of ``sensors`` per row; needed where the filter
+            has several.
+        place : array_like, shape (T, 2), optional
+            Where the sensor's station, or the leader, stood at each row, m; a NaN row, and default:
+            where the model has it.
+        age_s : float or array_like, shape (T,), optional
+            How long before each row its measurement was taken, s. One older than ``late_s`` is left
+            out and marked in the column ``too_late``.
+        reference : array_like, shape (T, 2), optional
+            Desired positions, m, for the policy; default: the estimates themselves.
+        covariance : bool
+            Whether ``P`` and ``S`` are recorded.
+
+        Returns
+        -------
+        RunResult
+
+        Raises
+        ------
+        ValueError, TypeError
+            If an argument is wrong; the filter is unchanged.
+        FilterError
+            If a row cannot be done. ``step`` names it, ``partial`` holds the results before it, and
+            the filter stays at the row before.
+        """
+        as_flag("covariance", covariance)
+        handles, which = self._as_sensor_rows(sensor)
+        width = max(handle.size for handle in handles)
+        rows = self._as_measurements(z, handles, which, width)
+        count = len(rows)
+        if which is not None and len(which) != count:
+            _refuse_rows("sensor", len(which), count)
+        if dt is None and self._policy is None:
+            raise TypeError("dt must be a number or an array of shape (T,), not None")
+        track = None
+        if self._policy is not None:
+            track = np.full((count, 2), np.nan, self._dtype)
+            if reference is not None:
+                track = as_array("reference", reference, (None, 2), self._dtype)
+                _require_rows("reference", track, count)
+        elif reference is not None:
+            raise TypeError("reference must be None: this filter has no interval policy")
+        record = {
+            "z": rows,
+            "dt": np.full(count, np.nan, self._dtype)
+            if dt is None
+            else as_steps(dt, count, self._dtype),
+            "input": self._as_inputs(input, count),
+            "place": self._as_places(place, handles, count),
+            "age_s": None if age_s is None else as_steps(age_s, count, self._dtype, "age_s"),
+            "reference": track,
+            "sensor": which,
+        }
+        done, status, columns = self._filter.run(record, handles, covariance)
+        for name in ("P", "S") if not covariance else ():
+            columns[name] = None
+        if self._policy is None:
+            columns["interval_s"] = None
+        if self.late_s == 0:
+            columns["too_late"] = None
+        result = RunResult(
+            **{key: None if column is None else column[:done] for key, column in columns.items()}
+        )
+        if status != Status.ok:
+            error = FilterError("run", status, step=done, partial=result)
+            raised = [model.take_error() for model in (self._process, *self._sensors.values())]
+            raise error from next((cause for cause in raised if cause is not None), None)
+        return result
+
+    # ---- State ----------------------------------------------------------------------------------
+
+    def save(self) -> bytes:
+        """Give the state, for :meth:`restore`: all that the filter carries from step to step.
+
+        The models, the parameters and the precision are named in it; pickle the filter to keep
+        those too.
+
+        Raises
+        ------
+        ValueError
+            If the filter remembers updates by a model that cannot be named.
+        """
+        arrays, events = self._filter.save()
+        known = sorted(set(events) - {""})
+        for description in known:
+            if description.startswith(UNSAVED):
+                raise ValueError(description.removeprefix(UNSAVED))
+        index = {description: k for k, description in enumerate(known)}
+        arrays["event_sensor"] = np.array([index.get(name, -1) for name in events], np.int64)
+        models = f"[{','.join(known)}]".encode()
+        arrays["event_models"] = np.frombuffer(models, np.uint8)
+        arrays["status"] = np.array(int(self.status), np.int64)
+        report = self._filter.report
+        if report is not None:
+            for name in _REPORT:
+                arrays[f"report_{name}"] = report[name]
+            arrays["report_nis"] = np.array(report["nis"], self._dtype)
+            flags = [report["near_field"], report["decision"], report["iterations"]]
+            arrays["report_flags"] = np.array(
+                [int(flag) for flag in (*flags, report["recovered"])], np.int64
+            )
+        return pack(type(self).__name__, self._description(), arrays)
+
+    def restore(self, state: bytes) -> None:
+        """Take back what :meth:`save` gave; the filter goes on with the same bits.
+
+        Raises
+        ------
+        ValueError, TypeError
+            If the state is damaged or not that of a filter of this class, with these models,
+            parameters and precision. The filter is then unchanged.
+        """
+        arrays = unpack(state, type(self).__name__, self._description())
+        status = Status(int(arrays.pop("status")))
+        models = json.loads(arrays.pop("event_models").tobytes())
+        own = {handle.description: handle for handle in self._handles.values()}
+        handles = [own.get(json.dumps(model)) or self._rebuilt(model) for model in models]
+        events = [None if k < 0 else handles[k] for k in arrays.pop("event_sensor")]
+        report = None
+        if "report_nis" in arrays:
+            flags = [int(flag) for flag in arrays.pop("report_flags")]
+            report = {name: arrays.pop(f"report_{name}").ravel() for name in _REPORT}
+            report["nis"] = float(arrays.pop("report_nis"))
+            report["near_field"], report["recovered"] = bool(flags[0]), bool(flags[3])
+            report["decision"], report["iterations"] = Decision(flags[1]), flags[2]
+        try:
+            self._filter.restore(arrays, events)
+        except _core.StatusError as error:
+            raise ValueError(f"state is refused: {error}") from None
+        self._filter.set_report(report, status)
+
+    def _rebuilt(self, description: dict[str, Any]) -> _Sensor[Any]:
+        model: MeasurementModel = as_instance(
+            "state", from_description(description), MeasurementModel
+        )
+        return model.core(len(self._process.state), self._dtype)
+
+    def _description(self) -> dict[str, Any]:
+        return {
+            "dtype": self._dtype.name,
+            "process": describe(self._process),
+            "sensors": {name: describe(model) for name, model in self._sensors.items()},
+            "kernel": describe(self._kernel),
+            "recovery": describe(self._recovery),
+            "policy": describe(self._policy),
+            **self._options,
+            **self._parameters,
+        }
+
+    def __getstate__(self) -> dict[str, Any]:
+        kept = {k: v for k, v in vars(self).items() if k not in ("_filter", "_handles", "_only")}
+        return {"members": kept, "state": self.save()}
+
+    def __setstate__(self, pickled: dict[str, Any]) -> None:
+        vars(self).update(pickled["members"])
+        self._build()
+        self.restore(pickled["state"])
+
+    def __copy__(self) -> Self:
+        twin = type(self).__new__(type(self))
+        vars(twin).update(vars(self))
+        twin._filter = self._filter.copy()
+        return twin
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        return self.__copy__()  # models are frozen: they may be shared
+
+    def __repr__(self) -> str:
+        x = np.array2string(self.x, precision=4, separator=", ")
+        kernel = "" if self._kernel is None else f"kernel={self._kernel}, "
+        return (
+            f"{type(self).__name__}(process={type(self._process).__name__}, {kernel}"
+            f"dtype={self._dtype.name}, x={x})"
+        )
+
+    # ---- Arguments ------------------------------------------------------------------------------
+
+    def _handle(self, sensor: str | MeasurementModel | None) -> _Sensor[Any]:
+        """Find the core's sensor of an argument ``sensor``."""
+        if isinstance(sensor, str):
+            if sensor not in self._handles:
+                raise ValueError(f"sensor must be {_named(self._sensors)}, not {sensor!r}")
+            return self._handles[sensor]
+        if sensor is None:
+            if self._only is not None:
+                return self._only
+            what = _named(self._sensors) if self._sensors else "a model: this filter has none"
+            raise TypeError(f"sensor must be {what}")
+        model: MeasurementModel = as_instance("sensor", sensor, MeasurementModel)
+        model.check_process(self._process)
+        return model.core(len(self._process.state), self._dtype)
+
+    def _as_sensor_rows(
+        self, sensor: str | MeasurementModel | Sequence[str] | None
+    ) -> tuple[list[Any], npt.NDArray[np.int32] | None]:
+        """Give the core's sensors and, where there are several, which of them each row has."""
+        if sensor is None or isinstance(sensor, (str, MeasurementModel)):
+            return [self._handle(sensor)], None
+        names = np.asarray(sensor)
+        if names.ndim != 1 or names.dtype.kind not in "UO":
+            raise TypeError("sensor must be a name, a model or a sequence of names, one per row")
+        used = list(dict.fromkeys(names.tolist()))
+        handles = [self._handle(name) for name in used]
+        index = {name: k for k, name in enumerate(used)}
+        return handles, np.array([index[name] for name in names.tolist()], np.int32)
+
+    def _as_measurements(
+        self,
+        z: npt.ArrayLike,
+        handles: list[Any],
+        which: npt.NDArray[np.int32] | None,
+        width: int,
+    ) -> Floats:
+        if width == 1 and np.ndim(z) == 1:
+            z = np.asarray(z)[:, np.newaxis]
+        if which is None:
+            return as_array("z", z, (None, width), self._dtype, missing=True)
+        raw = np.array(z, np.float64)
+        sizes = np.array([handle.size for handle in handles])
+        if raw.ndim == 2 and raw.shape[1] == width and len(raw) == len(which):
+            beyond = np.arange(width) >= sizes[which][:, np.newaxis]
+            if not np.isnan(raw[beyond]).all():
+                k, m = (int(i) for i in np.argwhere(beyond & ~np.isnan(raw))[0])
+                raise ValueError(
+                    f"z[{k}, {m}] is {raw[k, m]}, but the sensor of row {k} measures "
+                    f"{sizes[which[k]]} numbers; the rest must be NaN"
+                )
+            given = ~np.isnan(raw[:, 0])
+            raw[beyond & given[:, np.newaxis]] = 0.0
+            rows = as_array("z", raw, (None, width), self._dtype, missing=True)
+            rows[beyond] = np.nan
+            return rows
+        return as_array("z", raw, (None, width), self._dtype, missing=True)
+
+    def _as_input(self, input: npt.ArrayLike | None) -> Floats | None:
+        names = self._process.input
+        if not names:
+            self._refuse_input(input)
+            return None
+        return as_array("input", input, (len(names),), self._dtype)
+
+    def _as_inputs(self, input: npt.ArrayLike | None, count: int) -> Floats | None:
+        names = self._process.input
+        if not names:
+            self._refuse_input(input)
+            return None
+        inputs = as_array("input", input, (None, len(names)), self._dtype)
+        _require_rows("input", inputs, count)
+        return inputs
+
+    def _refuse_input(self, input: object) -> None:
+        if input is not None:
+            raise TypeError(f"input must be None: {type(self._process).__name__} has no input")
+
+    def _as_place(self, place: npt.ArrayLike, handle: _Sensor[Any]) -> Floats:
+        if handle.place == 0:
+            raise TypeError("place must be None: this sensor stands nowhere")
+        return as_array("place", place, (handle.place,), self._dtype)
+
+    def _as_places(
+        self, place: npt.ArrayLike | None, handles: list[Any], count: int
+    ) -> Floats | None:
+        if place is None:
+            return None
+        width = max(handle.place for handle in handles)
+        if width == 0:
+            raise TypeError("place must be None: this sensor stands nowhere")
+        given = as_array("place", place, (None, width), self._dtype, missing=True)
+        _require_rows("place", given, count)
+        places = np.full((count, _core.MAX_PLACE), np.nan, self._dtype)
+        places[:, :width] = given
+        return places
+
+    def _require_done(self, action: str, code: int) -> None:
+        if code == 0:
+            return
+        for model in (self._process, *self._sensors.values()):
+            raised = model.take_error()
+            if raised is not None:
+                raise raised
+        raise FilterError(action, Status(code)) from None
+
+
+def _as_sensors(sensors: Sensors, process: ProcessModel) -> dict[str, MeasurementModel]:
+    """Take one model, several, or several by name."""
+    if isinstance(sensors, MeasurementModel):
+        sensors = (sensors,)
+    if isinstance(sensors, Mapping):
+        named = dict(sensors)
+        for name in named:
+            if not isinstance(name, str):
+                raise TypeError(f"the names of sensors must be str, not {type(name).__name__}")
+    elif isinstance(sensors, Sequence) and not isinstance(sensors, str):
+        named = {}
+        for model in sensors:
+            name = type(model).__name__
+            if name in named:
+                raise ValueError(
+                    f"sensors has two {name}; name them: sensors={{'first': ..., 'second': ...}}"
+                )
+            named[name] = model
+    else:
+        raise TypeError(
+            "sensors must be a measurement model, a sequence of them or a dict of them by name, "
+            f"not {type(sensors).__name__}"
+        )
+    for name, model in named.items():
+        as_instance(f"sensors[{name!r}]", model, MeasurementModel)
+        model.check_process(process)
+    return named
+
+
+def _named(sensors: Mapping[str, MeasurementModel]) -> str:
+    return " or ".join(repr(name) for name in sensors)
+
+
+def _require_rows(name: str, array: Floats, rows: int) -> None:
+    if len(array) != rows:
+        _refuse_rows(name, len(array), rows)
+
+
+def _refuse_rows(name: str, have: int, rows: int) -> NoReturn:
+    raise ValueError(f"{name} has {have} rows and z has {rows}; they must have the same")

@@ -1,0 +1,102 @@
+"""What the filters of the family report: :class:`Report` of an update, :class:`RunResult` of a run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from auvest._arguments import Floats
+from auvest._core import Decision
+from auvest.results import Result
+
+
+@dataclass(frozen=True)
+class Report:
+    """What an update reports; m numbers in a measurement.
+
+    Attributes
+    ----------
+    innovation : ndarray, shape (m,)
+        Measured minus predicted, or a position error (m) where ``near_field``.
+    S : ndarray, shape (m, m)
+        Covariance of the innovation before any weight.
+    nis : float
+        Normalised innovation squared before any weight, chi-square with m degrees of freedom.
+    near_field : bool
+        True if the measurement was taken as a position (see :class:`auvest.RangeBearing`).
+    standardised, weight : ndarray, shape (m,)
+        The residuals that the kernel judged, in sigma, and the weights it gave, 0..1.
+    decision : Decision
+        accepted, downweighted or rejected.
+    iterations : int
+        Until the weights were final; innovations take 1.
+    recovered : bool
+        True if the recovery widened the covariance after this update.
+    """
+
+    innovation: Floats
+    S: Floats
+    nis: float
+    near_field: bool
+    standardised: Floats
+    weight: Floats
+    decision: Decision
+    iterations: int
+    recovered: bool
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class RunResult(Result):
+    """What ``run`` returns; row k of each column is the state of affairs after row k of the record.
+
+    T rows, n states, m numbers in a measurement: where sensors differ, those of the largest, and
+    NaN behind the numbers of the others. Where a measurement is missing, floats of the update are
+    NaN and ``iterations`` is 0. A column in brackets is there if it was asked for.
+
+    Attributes
+    ----------
+    x : ndarray, shape (T, n)
+        Estimates.
+    P : ndarray, shape (T, n, n)
+        Covariances [``covariance=True``].
+    innovation : ndarray, shape (T, m)
+        Innovations.
+    S : ndarray, shape (T, m, m)
+        Covariances of the innovations before any weight [``covariance=True``].
+    nis : ndarray, shape (T,)
+        Normalised innovation squared before any weight, chi-square with as many degrees of freedom
+        as the measurement has numbers.
+    near_field : ndarray of bool, shape (T,)
+        True where the measurement was taken as a position (see :class:`auvest.RangeBearing`).
+    standardised : ndarray, shape (T, m)
+        The residuals that the kernel judged, in sigma.
+    weight : ndarray, shape (T, m)
+        The weights it gave, 0..1.
+    decision : ndarray of uint8, shape (T,)
+        What became of the measurement, an :class:`auvest.Decision`; 0 where it is missing.
+    iterations : ndarray of uint8, shape (T,)
+        Until the weights were final; innovations take 1.
+    recovered : ndarray of bool, shape (T,)
+        True where the recovery widened the covariance.
+    interval_s : ndarray, shape (T,)
+        Interval that the policy chose for the next sample, s [filters with a policy].
+    too_late : ndarray of bool, shape (T,)
+        True where a measurement was older than the filter remembers, and was left out [filters with
+        ``late_s``].
+    """
+
+    x: Floats
+    P: Floats
+    innovation: Floats
+    S: Floats
+    nis: Floats
+    near_field: npt.NDArray[np.bool_]
+    standardised: Floats
+    weight: Floats
+    decision: npt.NDArray[np.uint8]
+    iterations: npt.NDArray[np.uint8]
+    recovered: npt.NDArray[np.bool_]
+    interval_s: Floats
+    too_late: npt.NDArray[np.bool_]

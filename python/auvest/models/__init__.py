@@ -1,0 +1,58 @@
+"""Process and measurement models: one module each."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from auvest.models._base import MeasurementModel, Model, ProcessModel
+from auvest.models.constant_acceleration import ConstantAcceleration
+from auvest.models.functions import FunctionProcess, FunctionSensor
+from auvest.models.leader_range import LeaderRange
+from auvest.models.odometry import Odometry
+from auvest.models.range_bearing import RangeBearing
+from auvest.models.speed_heading import SpeedHeading
+
+#: Every process and every sensor, by the name of its class.
+PROCESSES: dict[str, type[ProcessModel]] = {
+    model.__name__: model for model in (ConstantAcceleration, Odometry, SpeedHeading)
+}
+SENSORS: dict[str, type[MeasurementModel]] = {
+    model.__name__: model for model in (LeaderRange, RangeBearing)
+}
+
+
+def from_description(description: dict[str, Any]) -> Model:
+    """Make the model again that :func:`auvest._state.describe` described.
+
+    Raises
+    ------
+    ValueError
+        If there is no such model.
+    """
+    params = dict(description)
+    name = params.pop("class", None)
+    model = {**PROCESSES, **SENSORS}.get(name)
+    if model is None:
+        raise ValueError(f"there is no model {name!r}")
+    return model(**{key: _plain(value) for key, value in params.items()})
+
+
+def _plain(value: Any) -> Any:
+    return tuple(_plain(item) for item in value) if isinstance(value, list) else value
+
+
+__all__ = [
+    "PROCESSES",
+    "SENSORS",
+    "ConstantAcceleration",
+    "FunctionProcess",
+    "FunctionSensor",
+    "LeaderRange",
+    "MeasurementModel",
+    "Model",
+    "Odometry",
+    "ProcessModel",
+    "RangeBearing",
+    "SpeedHeading",
+    "from_description",
+]

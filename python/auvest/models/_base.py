@@ -1,0 +1,233 @@
+"""What every model has in common: its size, its names, and its counterpart in the core."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from auvest import _core
+from auvest._arguments import (
+    Bound,
+    DType,
+    Floats,
+    as_array,
+    as_number,
+    require_range,
+)
+from auvest._state import describe
+
+if TYPE_CHECKING:
+    from auvest._core import _Process, _Sensor
+
+_FLOAT64 = np.dtype(np.float64)
+
+
+class Model:
+    """A frozen dataclass of parameters that knows its counterpart in the core.
+
+    Handles on the core are made when they are first needed and stay with the model; they are no
+    part of its value, and are not pickled.
+    """
+
+    #: Fields that choose the core's class and are no parameters of it.
+    structural: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    def core_name(self) -> str:
+        """Name of the model in the core's registry."""
+        return type(self).__name__
+
+    def _core_params(self) -> dict[str, float]:
+        """Give the parameters under their names in the core."""
+        return {
+            field.name: getattr(self, field.name)
+            for field in fields(self)  # type: ignore[arg-type]
+            if field.name not in self.structural
+        }
+
+    def _core_defaults(self) -> dict[str, float]:
+        """Give the core's own parameters by name, in its order."""
+        raise NotImplementedError
+
+    def values(self, dtype: str) -> Floats:
+        """Give the parameters in the core's order; refuse those that ``dtype`` cannot hold."""
+        params = self._core_params()
+        squared = tuple(name for name in params if name.startswith("sigma_"))
+        require_range(params, dtype, squared=squared if self._squares else ())
+        return np.array([params[name] for name in self._core_defaults()], dtype)
+
+    #: Whether the sigmas are squared before they are used.
+    _squares: ClassVar[bool] = False
+
+    def _handle(self, key: Any, make: Any) -> Any:
+        handles = self.__dict__.get("_handles")
+        if handles is None:
+            handles = {}
+            object.__setattr__(self, "_handles", handles)
+        if key not in handles:
+            handles[key] = make()
+        return handles[key]
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name != "_handles"}
+
+    def _set_numbers(self, bound: Bound, *names: str) -> None:
+        for name in names:
+            object.__setattr__(self, name, as_number(name, getattr(self, name), bound))
+
+
+    def take_error(self) -> BaseException | None:
+        """Give what a function of the model raised since the last time."""
+        raised: list[BaseException] = self.__dict__.get("_raised", [])
+        return raised.pop() if raised else None
+
+
+#: Begins what is kept instead of a description where a model cannot be described.
+UNSAVED = "!"
+
+
+def saved_as(model: Model) -> str:
+    """Describe a model as JSON; where it cannot be, give the reason behind UNSAVED."""
+    try:
+        return json.dumps(describe(model))
+    except ValueError as error:
+        return f"{UNSAVED}{error}"
+
+
+class ProcessModel(Model):
+    """A process model: how the state moves, and what noise drives it.
+
+    Attributes
+    ----------
+    state : tuple of str
+        Names of the states, with units.
+    input : tuple of str
+        Names of the numbers that drive a prediction; empty if there are none.
+    """
+
+    state: tuple[str, ...] = ()
+    input: ClassVar[tuple[str, ...]] = ()
+
+    def _core_defaults(self) -> dict[str, float]:
+        return _core.process_defaults(self.core_name)
+
+    def core(self, dtype: DType) -> _Process[Any]:
+        """Give the core's process model in this precision."""
+
+        def make() -> Any:
+            make_process = getattr(_core, f"make_process_{dtype.name}")
+            return make_process(self.core_name, self.values(dtype.name))
+
+        process: _Process[Any] = self._handle(dtype.name, make)
+        return process
+
+    def f(
+        self, x: npt.ArrayLike, dt: float, input: npt.ArrayLike | None = None
+    ) -> npt.NDArray[np.float64]:
+        """State (n,) after ``dt >= 0`` seconds without noise, in float64."""
+        state = as_array("x", x, (len(self.state),), _FLOAT64)
+        after: npt.NDArray[np.float64] = self.core(_FLOAT64).f(
+            state, as_number("dt", dt, "not negative"), self._as_input(input)
+        )
+        return after
+
+    def Phi(
+        self, dt: float, x: npt.ArrayLike | None = None, input: npt.ArrayLike | None = None
+    ) -> npt.NDArray[np.float64]:
+        """Jacobian (n, n) of ``f`` at ``x``, in float64; a linear process needs no ``x``."""
+        state = np.zeros(len(self.state))
+        if x is not None:
+            state = as_array("x", x, (len(self.state),), _FLOAT64)
+        phi: npt.NDArray[np.float64] = self.core(_FLOAT64).Phi(
+            state, as_number("dt", dt, "not negative"), self._as_input(input)
+        )
+        return phi
+
+    def Q(self, dt: float, input: npt.ArrayLike | None = None) -> npt.NDArray[np.float64]:
+        """Covariance (n, n) of the process noise of ``dt >= 0`` seconds, in float64."""
+        q: npt.NDArray[np.float64] = self.core(_FLOAT64).Q(
+            as_number("dt", dt, "not negative"), self._as_input(input)
+        )
+        return q
+
+    def _as_input(self, input: npt.ArrayLike | None) -> npt.NDArray[np.float64]:
+        if input is None:
+            return np.zeros(len(self.input))
+        return as_array("input", input, (len(self.input),), _FLOAT64)
+
+
+class MeasurementModel(Model):
+    """A measurement model: what a sensor would read in a state, and its noise.
+
+    Attributes
+    ----------
+    observes : tuple of str
+        Names of the leading states that the measurement depends on.
+    measures : tuple of str
+        Names of the numbers of a measurement, with units.
+    place : str or None
+        Name of the field that says where the sensor (or what it ranges to) stands; None: nowhere.
+    """
+
+    observes: ClassVar[tuple[str, ...]] = ("x_m", "y_m")
+    measures: tuple[str, ...] = ()
+    place: ClassVar[str | None] = None
+    _squares = True
+
+    def _core_defaults(self) -> dict[str, float]:
+        return _core.sensor_defaults(self.core_name)
+
+    def core(self, states: int, dtype: DType) -> _Sensor[Any]:
+        """Give the core's measurement model for so many states in this precision."""
+
+        def make() -> Any:
+            make_sensor = getattr(_core, f"make_sensor_{dtype.name}")
+            sensor = make_sensor(self.core_name, states, self.values(dtype.name))
+            sensor.description = saved_as(self)
+            return sensor
+
+        sensor: _Sensor[Any] = self._handle((states, dtype.name), make)
+        return sensor
+
+    def h(self, x: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Measurements without noise.
+
+        Parameters
+        ----------
+        x : array_like, shape (n,) or (K, n)
+            States, or their leading components: all that the measurement depends on.
+
+        Returns
+        -------
+        ndarray, shape (m,) or (K, m)
+        """
+        least = len(self.observes)
+        rows = np.atleast_2d(as_array("x", x, (None,) * np.ndim(x), _FLOAT64))
+        known = _core.sensor_states(self.core_name)
+        if np.ndim(x) not in (1, 2) or rows.shape[1] < least or np.shape(x)[-1] == 0:
+            raise ValueError(
+                f"x has shape {np.shape(x)}, expected (n,) or (K, n) with n at least {least}"
+            )
+        states = min(n for n in known if n >= least)
+        leading = np.zeros((len(rows), states))
+        leading[:, : min(states, rows.shape[1])] = rows[:, :states]
+        z: npt.NDArray[np.float64] = self.core(states, _FLOAT64).h(leading)
+        return z[0] if np.ndim(x) == 1 else z
+
+    def check_process(self, process: ProcessModel) -> None:
+        """Refuse a process whose state does not begin with what this measurement depends on.
+
+        Raises
+        ------
+        ValueError
+        """
+        if process.state[: len(self.observes)] != self.observes:
+            raise ValueError(
+                f"{type(self).__name__} observes {', '.join(self.observes)}, but the state of "
+                f"{type(process).__name__} begins with "
+                f"{', '.join(process.state[: len(self.observes)])}"
+            )

@@ -1,0 +1,49 @@
+"""Range to a leader of known position (Li, Du, Fan, Chen, Mao, Luo 2020)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from auvest import _core
+from auvest._arguments import as_pair
+from auvest.models._base import MeasurementModel
+
+_DEFAULTS = _core.sensor_defaults("LeaderRange")
+
+
+@dataclass(frozen=True, kw_only=True)
+class LeaderRange(MeasurementModel):
+    """Range (m) to a leader of known position, Eqs. (4) and (5); one per message, any leader.
+
+    Parameters
+    ----------
+    leader : (float, float)
+        Where the leader was when the range was taken, m.
+    sigma_range_m : float
+        Standard deviation of the range, positive.
+    sigma_leader_m : float
+        Standard deviation of the leader's position per axis, not negative; adds to the noise of the
+        range: ``R = sigma_range_m**2 + sigma_leader_m**2``.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If an argument lies outside its range.
+    """
+
+    measures = ("range_m",)
+    place = "leader"
+
+    leader: tuple[float, float] = (_DEFAULTS["leader_x_m"], _DEFAULTS["leader_y_m"])
+    sigma_range_m: float = _DEFAULTS["sigma_range_m"]
+    sigma_leader_m: float = _DEFAULTS["sigma_leader_m"]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "leader", as_pair("leader", self.leader))
+        self._set_numbers("positive", "sigma_range_m")
+        self._set_numbers("not negative", "sigma_leader_m")
+
+    def _core_params(self) -> dict[str, float]:
+        params = super()._core_params()
+        params["leader_x_m"], params["leader_y_m"] = params.pop("leader")  # type: ignore[misc]
+        return params
