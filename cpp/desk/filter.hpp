@@ -205,7 +205,7 @@ class FilterFor final : public AnyFilter<Scalar> {
     typename Adaptive::Position desired;
     for (int i = 0; i < 2; ++i) {
       const bool given = reference != nullptr && !math::is_nan(reference[i]);
-      desired(i) = given ? reference[i] : filter_.x()(i);
+      desired(i) = given ? reference[i] : filter_.x()(i < N ? i : 0);
     }
     return filter_.feedback(desired);
   }

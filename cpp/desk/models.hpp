@@ -170,9 +170,9 @@ class ProcessOf final : public ProcessFor<typename Process::Scalar, Process::kSt
   using Base = ProcessFor<Scalar, kStates>;
   using typename Base::Input;
 
-  /// `inputs`: how many of the numbers of the model's input count.
-  explicit ProcessOf(const Process& process, int inputs = kInputs)
-      : Base(inputs), process_(process) {}
+  /// `count`: how many of the numbers of the model's input count.
+  explicit ProcessOf(const Process& process, int count = kInputs)
+      : Base(count), process_(process) {}
 
   const Process& process() const { return process_; }
 

@@ -75,7 +75,7 @@ class AdaptiveInterval : public Filter {
   static Position position(const State& x) {
     Position p;
     p(0) = x(0);
-    p(1) = x(1);
+    p(1) = x(Filter::kStates > 1 ? 1 : 0);  // one state: there is no plane to have a law for
     return p;
   }
 

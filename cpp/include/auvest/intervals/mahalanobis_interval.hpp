@@ -93,7 +93,7 @@ struct MahalanobisInterval {
     Steps steps;  // [AUKF 9]
     for (int i = 0; i < 2; ++i) {
       const Scalar error = m.last_estimate(i) - m.last_reference(i);
-      steps[0][i] = step(m.last_estimate(i), filter.x()(i));
+      steps[0][i] = step(m.last_estimate(i), filter.x()(i < Filter::kStates ? i : 0));
       steps[1][i] = step(m.last_reference(i), reference(i));
       steps[2][i] = (m.last_estimate(i) - m.last_reference(i)) + error;
     }
