@@ -1,5 +1,7 @@
 // Models written in Python. A function that raises leaves its exception here and NaN in the core,
 // which refuses the step; the Python layer then raises what the function raised.
+#include <pybind11/stl.h>
+
 #include "desk/function_models.hpp"
 #include "handles.hpp"
 

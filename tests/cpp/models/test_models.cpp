@@ -4,20 +4,27 @@
 
 #include "close.hpp"
 
+#include <Eigen/LU>
 #include <cmath>
+#include <initializer_list>
+#include <limits>
 
 #include "auvest/filters/ekf.hpp"
 #include "auvest/filters/ukf.hpp"
 #include "auvest/math/random.hpp"
+#include "auvest/models/body_velocity.hpp"
 #include "auvest/models/constant_acceleration.hpp"
 #include "auvest/models/constant_velocity.hpp"
 #include "auvest/models/coordinated_turn.hpp"
+#include "auvest/models/depth.hpp"
 #include "auvest/models/leader_range.hpp"
 #include "auvest/models/linear.hpp"
 #include "auvest/models/odometry.hpp"
 #include "auvest/models/piecewise_acceleration.hpp"
+#include "auvest/models/position.hpp"
 #include "auvest/models/range_bearing.hpp"
 #include "auvest/models/speed_heading.hpp"
+#include "auvest/models/white_acceleration.hpp"
 
 namespace {
 
@@ -123,27 +130,83 @@ void check_measurement(const Model& model, double scale) {
   }
 }
 
-template <class Model>
-void check_position_variance(const Model& model, const Belief<double, 6>& before) {
-  Belief<double, 6> after = before;
-  model.propagate(after, 0.7);
-  CHECK(model.position_variance(before, 0.7) == close_to(after.P(0, 0) + after.P(1, 1), 1e-14));
+/// position_variance is the trace of the position block, of so many axes, that propagate gives.
+template <int Axes, class Model>
+void check_position_variance(const Model& model) {
+  constexpr int n = Model::kStates;
+  Random random(5);
+  Belief<double, n> belief;
+  Matrix<double, n, n> a;
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < n; ++j) a(i, j) = random.normal<double>();
+  }
+  belief.x.setZero();
+  belief.P = a * a.transpose();
+  const Belief<double, n> before = belief;
+  model.propagate(belief, 0.7);
+  double trace = 0;
+  for (int i = 0; i < Axes; ++i) trace += belief.P(i, i);
+  CHECK(model.position_variance(before, 0.7) == close_to(trace, 1e-14));
 }
 
-/// A filter fed with noise-free measurements of a standing target must end on it.
-template <class Filter, class Model>
-void check_convergence(Filter filter, const Model& model, const Vector<double, 6>& truth) {
-  Vector<double, 6> x = truth;
-  x(0) += 0.3;
-  x(1) -= 0.2;
-  Matrix<double, 6, 6> P = Matrix<double, 6, 6>::Identity();
-  REQUIRE(filter.reset(x, P) == auvest::Status::kOk);
+/// A filter fed with noise-free measurements of a target that moves as its process does must end
+/// on it, in as many leading states as `offset` has.
+template <class Filter, int Axes, class... Models>
+void check_convergence(Filter filter, typename Filter::State truth,
+                       const Vector<double, Axes>& offset, const Models&... models) {
+  typename Filter::State x = truth;
+  for (int i = 0; i < Axes; ++i) x(i) += offset(i);
+  REQUIRE(filter.reset(x, Filter::Covariance::Identity()) == auvest::Status::kOk);
   for (int k = 0; k < 400; ++k) {
+    truth = filter.process().f(truth, 0.5);
     REQUIRE(filter.predict(0.5) == auvest::Status::kOk);
-    REQUIRE(filter.update(model.h(truth), model).status == auvest::Status::kOk);
+    const bool updated[] = {filter.update(models.h(truth), models).status ==
+                            auvest::Status::kOk...};
+    for (const bool done : updated) REQUIRE(done);
   }
-  CHECK(std::fabs(filter.x()(0) - truth(0)) < 1e-3);
-  CHECK(std::fabs(filter.x()(1) - truth(1)) < 1e-3);
+  for (int i = 0; i < Axes; ++i) CHECK(std::fabs(filter.x()(i) - truth(i)) < 1e-3);
+}
+
+/// A linear model's update is the textbook's, K = P H' (H P H' + R)^-1, in any Gaussian filter.
+template <template <class> class Filter, class Process, class Model>
+void check_textbook(const Process& process, const Model& model, double tolerance) {
+  constexpr int n = Model::kStates;
+  constexpr int m = Model::kSize;
+  Random random(17);
+  Matrix<double, n, n> a;
+  Vector<double, n> x;
+  for (int i = 0; i < n; ++i) {
+    x(i) = random.normal<double>();
+    for (int j = 0; j < n; ++j) a(i, j) = random.normal<double>();
+  }
+  const Matrix<double, n, n> P = a * a.transpose() + Matrix<double, n, n>::Identity();
+  Vector<double, m> z;
+  for (int i = 0; i < m; ++i) z(i) = 2 * random.normal<double>();
+  Matrix<double, m, n> H = Matrix<double, m, n>::Zero();
+  H.template leftCols<Model::kObserved>() =
+      model.H(x.template cast<typename Model::Scalar>()).template cast<double>();
+  const Matrix<double, m, m> S = H * P * H.transpose() + model.R().template cast<double>();
+  const Matrix<double, n, m> K = P * H.transpose() * S.inverse();
+  const Vector<double, m> innovation = z - H * x;
+
+  using Scalar = typename Model::Scalar;
+  Filter<Process> filter{process};
+  REQUIRE(filter.reset(x.template cast<Scalar>(), P.template cast<Scalar>()) ==
+          auvest::Status::kOk);
+  const auto correction = filter.update(z.template cast<Scalar>(), model);
+  REQUIRE(correction.status == auvest::Status::kOk);
+  CHECK((filter.x().template cast<double>() - (x + K * innovation)).norm() < tolerance * x.norm());
+  CHECK((filter.P().template cast<double>() - (P - K * S * K.transpose())).norm() <
+        tolerance * P.norm());
+  CHECK(double(correction.nis) ==
+        close_to(innovation.dot(S.inverse() * innovation), 10 * tolerance));
+}
+
+template <class Process, class Model>
+void check_textbook(const Process& process, const Model& model) {
+  const double tolerance = sizeof(typename Model::Scalar) == 4 ? 2e-6 : 1e-12;
+  check_textbook<auvest::Ekf>(process, model, tolerance);
+  check_textbook<auvest::Ukf>(process, model, tolerance);
 }
 
 /// `model` driven: 2 m/s (m) ahead, 0.5 to the side, at 0.7 rad.
@@ -170,6 +233,42 @@ auvest::RangeBearing<double, 6> sonar() {
   return auvest::RangeBearing<double, 6>(p);
 }
 
+template <class Scalar, int Axes>
+auvest::WhiteAcceleration<Scalar, Axes> drifting() {
+  typename auvest::WhiteAcceleration<Scalar, Axes>::Params p;
+  p.velocity = Scalar(0.3);
+  p.vertical_velocity = Scalar(0.02);
+  return auvest::WhiteAcceleration<Scalar, Axes>(p);
+}
+
+/// A fix with errors that are correlated. Only the lower triangle of its covariance is given.
+template <class Scalar, int N, int M>
+auvest::Position<Scalar, N, M> fix() {
+  const double lower[3][3] = {{4, 0, 0}, {-1.5, 2, 0}, {0.5, 0.7, 1}};
+  typename auvest::Position<Scalar, N, M>::Params p;
+  for (int i = 0; i < M; ++i) {
+    for (int j = 0; j < M; ++j) p.covariance_m2(i, j) = Scalar(j > i ? std::nan("") : lower[i][j]);
+  }
+  return auvest::Position<Scalar, N, M>(p);
+}
+
+template <class Scalar, int N>
+auvest::Depth<Scalar, N> depth() {
+  typename auvest::Depth<Scalar, N>::Params p;
+  p.sigma_m = Scalar(0.3);
+  return auvest::Depth<Scalar, N>(p);
+}
+
+template <class Scalar, int N, int Axes>
+auvest::BodyVelocity<Scalar, N, Axes> log_at(double heading_rad) {
+  typename auvest::BodyVelocity<Scalar, N, Axes>::Params p;
+  p.heading_rad = Scalar(heading_rad);
+  p.sigma_forward_mps = Scalar(0.5);
+  p.sigma_sideways_mps = Scalar(0.8);
+  p.sigma_vertical_mps = Scalar(0.2);
+  return auvest::BodyVelocity<Scalar, N, Axes>(p);
+}
+
 TEST_CASE("process models") {
   check_process(auvest::EulerAcceleration<double>(), 0.5);
   check_process(auvest::PiecewiseAcceleration<double>(), 0.7);
@@ -185,6 +284,8 @@ TEST_CASE("process models") {
   check_process(driven(auvest::SpeedHeading<double, false, true>()), 0.5);
   check_process(driven(auvest::SpeedHeading<double, true, true>()), 0.5);
   check_process(driven(auvest::Odometry<double>()), 0.5);
+  check_process(drifting<double, 2>(), 0.7);
+  check_process(drifting<double, 3>(), 0.7);
   Matrix<double, 3, 3> phi;
   phi << 1, 0.5, 0, 0, 1, 0.5, 0.1, 0, 0.9;
   check_process(auvest::LinearProcess<double, 3>(phi, Matrix<double, 3, 3>::Identity()), 1);
@@ -193,6 +294,11 @@ TEST_CASE("process models") {
 TEST_CASE("measurement models") {
   check_measurement(sonar(), 100);
   check_measurement(leader<4>(30, -20), 100);
+  check_measurement(fix<double, 2, 2>(), 100);
+  check_measurement(fix<double, 6, 3>(), 100);
+  check_measurement(depth<double, 3>(), 100);
+  check_measurement(log_at<double, 6, 2>(2.5), 10);
+  check_measurement(log_at<double, 6, 3>(-0.7), 10);
   Matrix<double, 2, 3> h;
   h << 1, -1, 0.5, 0, 2, 1;
   check_measurement(auvest::LinearMeasurement<double, 5, 2, 3>(h, Matrix<double, 2, 2>::Identity()),
@@ -205,8 +311,9 @@ TEST_CASE("noiseless convergence, also across the bearing's cut") {
     Vector<double, 6> truth = Vector<double, 6>::Zero();
     truth(0) = -8;
     truth(1) = y;
-    check_convergence(auvest::Ekf<Process>(Process()), sonar(), truth);
-    check_convergence(auvest::Ukf<Process>(Process()), sonar(), truth);
+    const Vector<double, 2> offset(0.3, -0.2);
+    check_convergence(auvest::Ekf<Process>(Process()), truth, offset, sonar());
+    check_convergence(auvest::Ukf<Process>(Process()), truth, offset, sonar());
   }
 }
 
@@ -242,17 +349,11 @@ TEST_CASE("constant acceleration: exact steps compose, Euler steps do not") {
   }
 }
 
-TEST_CASE("constant acceleration: position_variance is the trace that propagate would give") {
-  Random random(5);
-  Belief<double, 6> belief;
-  Matrix<double, 6, 6> a;
-  for (int i = 0; i < 6; ++i) {
-    for (int j = 0; j < 6; ++j) a(i, j) = random.normal<double>();
-  }
-  belief.x.setZero();
-  belief.P = a * a.transpose();
-  check_position_variance(auvest::EulerAcceleration<double>(), belief);
-  check_position_variance(auvest::ExactAcceleration<double>(), belief);
+TEST_CASE("position_variance is the trace that propagate would give") {
+  check_position_variance<2>(auvest::EulerAcceleration<double>());
+  check_position_variance<2>(auvest::ExactAcceleration<double>());
+  check_position_variance<2>(drifting<double, 2>());
+  check_position_variance<3>(drifting<double, 3>());
 }
 
 TEST_CASE("constant velocity: an acceleration has no memory, but where no time passes") {
@@ -274,6 +375,50 @@ TEST_CASE("constant velocity: an acceleration has no memory, but where no time p
   CHECK(belief.P(0, 0) == close_to(1 + 4 + 1e-4 * 8 / 3, 1e-14));
   CHECK(belief.P(2, 0) == close_to(2 + 1e-4 * 4 / 2, 1e-14));
   CHECK(belief.P(2, 2) == close_to(1 + 1e-4 * 2, 1e-14));
+}
+
+TEST_CASE("nearly constant velocity: z has a density of its own, and steps compose") {
+  const auto space = drifting<double, 3>();
+  const auto q = space.Q(2);
+  for (int i = 0; i < 3; ++i) {
+    const double density = i < 2 ? 0.3 : 0.02;
+    CHECK(q(i, i) == close_to(density * 8 / 3, 1e-14));
+    CHECK(q(i + 3, i) == close_to(density * 4 / 2, 1e-14));
+    CHECK(q(i + 3, i + 3) == close_to(density * 2, 1e-14));
+    for (int j = 0; j < 6; ++j) {
+      if (j % 3 != i) CHECK(q(j, i) == 0);
+    }
+  }
+  // Two steps are one (Chapman-Kolmogorov), and x and y are those of the model in the plane.
+  Random random(5);
+  Belief<double, 6> once;
+  Matrix<double, 6, 6> a;
+  for (int i = 0; i < 6; ++i) {
+    once.x(i) = random.normal<double>();
+    for (int j = 0; j < 6; ++j) a(i, j) = random.normal<double>();
+  }
+  once.P = a * a.transpose();
+  Belief<double, 6> twice = once;
+  Belief<double, 4> plane;
+  const int where[4] = {0, 1, 3, 4};
+  for (int i = 0; i < 4; ++i) {
+    plane.x(i) = once.x(where[i]);
+    for (int j = 0; j < 4; ++j) plane.P(i, j) = once.P(where[i], where[j]);
+  }
+  space.propagate(once, 5);
+  space.propagate(twice, 2);
+  space.propagate(twice, 3);
+  drifting<double, 2>().propagate(plane, 5);
+  for (int i = 0; i < 6; ++i) {
+    CHECK(std::fabs(twice.x(i) - once.x(i)) < 1e-14 * once.x.norm());
+    for (int j = 0; j <= i; ++j) {
+      CHECK(std::fabs(twice.P(i, j) - once.P(i, j)) < 1e-14 * once.P.trace());
+    }
+  }
+  for (int i = 0; i < 4; ++i) {
+    CHECK(plane.x(i) == once.x(where[i]));
+    for (int j = 0; j <= i; ++j) CHECK(plane.P(i, j) == once.P(where[i], where[j]));
+  }
 }
 
 template <class Scalar>
@@ -309,6 +454,78 @@ TEST_CASE("coordinated turn: exact on a circle; straight on it is constant accel
   x << 1, 2, 0, 0, 0.6, 0.8;  // standing
   const auto start = auvest::ExactAcceleration<double>().f(x, 0.7);
   CHECK((auvest::CoordinatedTurn<double>().f(x, 0.7) - start).norm() < 1e-14);
+}
+
+TEST_CASE("position: the textbook's update, with every process that begins with x and y") {
+  check_textbook(auvest::SpeedHeading<double>(), fix<double, 2, 2>());
+  check_textbook(auvest::Odometry<double>(), fix<double, 3, 2>());
+  check_textbook(auvest::SpeedHeading<double, true, true>(), fix<double, 4, 2>());
+  check_textbook(drifting<double, 2>(), fix<double, 4, 2>());
+  check_textbook(auvest::ExactAcceleration<double>(), fix<double, 6, 2>());
+  check_textbook(auvest::CoordinatedTurn<double>(), fix<double, 6, 2>());
+  check_textbook(drifting<double, 3>(), fix<double, 6, 2>());
+  check_textbook(drifting<double, 3>(), fix<double, 6, 3>());
+  check_textbook(auvest::Odometry<float>(), fix<float, 3, 2>());
+  check_textbook(drifting<float, 3>(), fix<float, 6, 3>());
+}
+
+TEST_CASE("depth: the textbook's update; what is not correlated with z stays") {
+  check_textbook(drifting<double, 3>(), depth<double, 6>());
+  check_textbook(drifting<float, 3>(), depth<float, 6>());
+  using Process = auvest::WhiteAcceleration<double, 3>;
+  auvest::Ekf<Process> filter{Process()};
+  Vector<double, 6> x;
+  x << 10, -20, 30, 1, 2, 0;
+  Matrix<double, 6, 6> P = Matrix<double, 6, 6>::Identity();
+  P(1, 0) = P(0, 1) = 0.5;
+  P(3, 2) = P(2, 3) = 0.25;  // vx with z
+  REQUIRE(filter.reset(x, P) == auvest::Status::kOk);
+  // S = 1 + 0.09; K_z = 1 / S, K_vx = 0.25 / S.
+  REQUIRE(filter.update(Vector<double, 1>(31.09), depth<double, 6>()).status ==
+          auvest::Status::kOk);
+  CHECK(filter.x()(2) == close_to(31, 1e-14));
+  CHECK(filter.x()(3) == close_to(1.25, 1e-14));
+  for (const int i : {0, 1, 4, 5}) {
+    CHECK(filter.x()(i) == x(i));
+    for (int j = 0; j < 6; ++j) CHECK(std::fabs(filter.P()(i, j) - P(i, j)) < 1e-15);
+  }
+}
+
+TEST_CASE("body velocity: its axes by hand, and the textbook's update") {
+  // Heading along +y, moving along +y and a little along -x, which is 90 degrees further on.
+  const double half_pi = auvest::math::half_pi<double>();
+  Vector<double, 6> x;
+  x << 100, 200, -0.25, 1.5, 0, 0;
+  const auto plane = log_at<double, 6, 2>(half_pi).h(x);
+  CHECK(plane(0) == close_to(1.5, 1e-15));
+  CHECK(plane(1) == close_to(0.25, 1e-15));
+  x << 100, 200, 300, -0.25, 1.5, 0.125;
+  const auto space = log_at<double, 6, 3>(half_pi).h(x);
+  CHECK(space(0) == close_to(1.5, 1e-15));
+  CHECK(space(1) == close_to(0.25, 1e-15));
+  CHECK(space(2) == 0.125);
+  check_textbook(auvest::ExactAcceleration<double>(), log_at<double, 6, 2>(2.5));
+  check_textbook(drifting<double, 2>(), log_at<double, 4, 2>(-2.5));
+  check_textbook(drifting<double, 3>(), log_at<double, 6, 3>(0.7));
+  check_textbook(drifting<float, 3>(), log_at<float, 6, 3>(0.7));
+}
+
+TEST_CASE("sensors in space: together they find a moving vehicle") {
+  using Process = auvest::WhiteAcceleration<double, 3>;
+  const Process process;
+  Vector<double, 6> truth;
+  truth << 40, -30, 20, 0.7, -0.4, 0.1;
+  const Vector<double, 3> offset(0.3, -0.2, 0.5);
+  check_convergence(auvest::Ekf<Process>(process), truth, offset, fix<double, 6, 3>());
+  check_convergence(auvest::Ukf<Process>(process), truth, offset, fix<double, 6, 2>(),
+                    depth<double, 6>(), log_at<double, 6, 3>(2));
+  // What is made for a plane sees the first two of its states.
+  check_convergence(auvest::Ukf<Process>(process), truth, offset, sonar(), depth<double, 6>());
+  auto west = leader<6>(-300, 50);
+  auto north = leader<6>(60, 200);
+  west.params.sigma_range_m = north.params.sigma_range_m = 0.1;
+  west.params.sigma_leader_m = north.params.sigma_leader_m = 0;
+  check_convergence(auvest::Ekf<Process>(process), truth, offset, west, north, depth<double, 6>());
 }
 
 TEST_CASE("range and bearing: closed second differences against their Taylor series") {
@@ -610,6 +827,58 @@ TEST_CASE("models refuse bad parameters") {
   auvest::ConstantVelocity<double>::Params straight;
   straight.sigma_acceleration_mps2 = -1;
   CHECK(auvest::ConstantVelocity<double>(straight).check() == auvest::Status::kBadParameter);
+}
+
+template <class Scalar>
+void check_refusals() {
+  using auvest::Status;
+  using Space = auvest::WhiteAcceleration<Scalar, 3>;
+  using Log = auvest::BodyVelocity<Scalar, 6, 3>;
+  using Gauge = auvest::Depth<Scalar, 6>;
+  using Fix = auvest::Position<Scalar, 6, 3>;
+  CHECK(Space().check() == Status::kOk);
+  CHECK(Log().check() == Status::kOk);
+  CHECK(Gauge().check() == Status::kOk);
+  CHECK(Fix().check() == Status::kOk);
+  CHECK(fix<Scalar, 6, 3>().check() == Status::kOk);
+  const Scalar infinity = std::numeric_limits<Scalar>::infinity();
+  for (const Scalar bad : {Scalar(-1), Scalar(std::nan("")), infinity}) {
+    for (Scalar Space::Params::*member :
+         {&Space::Params::velocity, &Space::Params::vertical_velocity}) {
+      typename Space::Params p;
+      p.*member = bad;
+      CHECK(Space(p).check() == Status::kBadParameter);
+    }
+    for (Scalar Log::Params::*member :
+         {&Log::Params::sigma_forward_mps, &Log::Params::sigma_sideways_mps,
+          &Log::Params::sigma_vertical_mps}) {
+      typename Log::Params p;
+      p.*member = bad;
+      CHECK(Log(p).check() == Status::kBadParameter);
+    }
+    typename Gauge::Params gauge;
+    gauge.sigma_m = bad;
+    CHECK(Gauge(gauge).check() == Status::kBadParameter);
+    for (int i = 0; i < 3; ++i) {
+      typename Fix::Params p;
+      p.covariance_m2(i, i) = bad;
+      CHECK(Fix(p).check() == Status::kBadParameter);
+    }
+    typename Fix::Params p;
+    p.covariance_m2(2, 1) = bad;  // -1: a correlation of -1
+    CHECK(Fix(p).check() == Status::kBadParameter);
+    typename Log::Params log;
+    log.heading_rad = bad;
+    CHECK(Log(log).check() == (bad < 0 ? Status::kOk : Status::kBadParameter));
+  }
+  typename Gauge::Params exact;
+  exact.sigma_m = Scalar(0);  // no measurement is
+  CHECK(Gauge(exact).check() == Status::kBadParameter);
+}
+
+TEST_CASE("models refuse bad parameters: fixes, depth, velocity, and their process") {
+  check_refusals<float>();
+  check_refusals<double>();
 }
 
 }  // namespace
