@@ -485,6 +485,7 @@ class _CooperativeDict(TypedDict):
     sigma_speed: float
     sigma_heading: float
     late_steps: int
+    messages_in_flight: int
     most_late_steps: int
 
 def cooperative_defaults() -> _CooperativeDict: ...

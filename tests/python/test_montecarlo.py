@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import subprocess
 import sys
@@ -13,6 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from processes import PATIENCE_S, start_program, wait_until
 
 from auvest import montecarlo
 from auvest._core import Random
@@ -74,7 +74,8 @@ import test_montecarlo as t
 from auvest import montecarlo
 
 def slow(first, count):
-    time.sleep(0.05)
+    if first >= {stop}:
+        time.sleep(3600)  # until it is killed
     with open({log!r}, "a") as file:
         file.write(f"{{first}}\\n")
     return t.task(first, count)
@@ -88,21 +89,23 @@ montecarlo.write_table(Path({table!r}), columns)
 
 def test_a_killed_program_goes_on_where_it_stood(tmp_path: Path) -> None:
     log, store, table = (tmp_path / name for name in ("log", "store", "table.csv"))
-    program = PROGRAM.format(
-        tests=str(Path(__file__).parent), log=str(log), store=str(store), table=str(table)
-    )
-    command = [sys.executable, "-c", program]
-    with subprocess.Popen(command) as first:
-        deadline = time.monotonic() + 60
-        while len(list(store.glob("*.npz"))) < 6 and time.monotonic() < deadline:
-            time.sleep(0.01)
-        os.kill(first.pid, signal.SIGKILL)
+
+    def command(stop: int) -> list[str]:
+        program = PROGRAM.format(
+            tests=str(Path(__file__).parent), log=str(log), store=str(store), table=str(table),
+            stop=stop,
+        )  # fmt: skip
+        return [sys.executable, "-c", program]
+
+    with start_program(command(stop=40)) as first:
+        wait_until(lambda: len(list(store.glob("*.npz"))) >= 6, "six chunks are kept", first)
+        first.kill()
     assert first.returncode == -signal.SIGKILL
     kept = len(list(store.glob("*.npz")))
-    assert 6 <= kept < 30
+    assert 6 <= kept <= 20  # it could not go on beyond
     assert not table.exists()
     before = len(log.read_text().splitlines())
-    subprocess.run(command, check=True, timeout=60)
+    subprocess.run(command(stop=60), check=True, timeout=PATIENCE_S)
     again = len(log.read_text().splitlines()) - before
     assert again == 30 - kept
     unbroken = montecarlo.write_table(tmp_path / "unbroken.csv", montecarlo.run(task, 60))

@@ -9,7 +9,6 @@ import re
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from dataclasses import fields, replace
 from pathlib import Path
@@ -21,6 +20,7 @@ import pyarrow.csv as pa_csv
 import pyarrow.parquet as pa_parquet
 import pytest
 from conftest import ROOT
+from processes import PATIENCE_S, start_program, wait_until
 from typer.testing import CliRunner
 
 from auvest import Aukf, CovarianceBudget, LeaderRange, Odometry, RangeBearing, RobustEkf
@@ -714,22 +714,16 @@ def test_a_million_rows_take_no_more_memory_than_fewer(tmp_path: Path, million: 
 
 def test_ctrl_c_keeps_what_was_done(tmp_path: Path, million: Path) -> None:
     output = tmp_path / "out"
-    program = subprocess.Popen(
+    program = start_program(
         [sys.executable, "-m", "auvest", "replay", million, "--output", output, "--json"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
         env={**os.environ, "COLUMNS": "200"},
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )
     track = output / "million" / "trajectory.tum"
-    deadline = time.monotonic() + 60
-    while not (track.exists() and track.stat().st_size > 100_000):
-        assert time.monotonic() < deadline, "nothing was written in a minute"
-        assert program.poll() is None, program.communicate()
-        time.sleep(0.005)
+    wait_until(
+        lambda: track.exists() and track.stat().st_size > 100_000, "nothing was written", program
+    )
     program.send_signal(signal.SIGINT)
-    out, err = program.communicate(timeout=60)
+    out, err = program.communicate(timeout=PATIENCE_S)
     assert program.returncode == 130, err
     assert "interrupted in million: what was done is written" in " ".join(err.split())
     (result,) = json.loads(out)["logs"]

@@ -130,6 +130,23 @@ def test_unit_is_the_plain_filter(tmp_path):
     assert results["plain"]["rmse_m"] == results["robust"]["rmse_m"]
 
 
+def test_every_message_of_simulate_is_in_its_numbers(tmp_path):
+    """80 ranges in 400 s, in each of 4 runs; a range is complete two ranges later."""
+    options = ["--timing", "own-time", "--dropout", "0.3", "--late", "0.3"]
+    robust = simulated(tmp_path, *options)["robust"]
+    assert 0.2 * 320 < robust["lost"] < 0.4 * 320
+    assert (robust["too_late"], robust["overflowed"]) == (0, 0)
+    on_their_way = 320 - robust["ranges_taken"] - robust["lost"]
+    assert 0 < on_their_way <= 4 * 4
+
+    command = [*QUICK, *options, "--output", str(tmp_path)]
+    command.remove("--json")
+    table = CliRunner().invoke(app, command).stdout
+    (shown,) = re.findall(r"lost in the water\D+(\d+)\D+(\d+)", table)
+    assert shown == (str(robust["lost"]), str(robust["lost"]))
+    assert re.search(r"too many in flight\D+0\D+0", table)
+
+
 def test_consistency_is_judged_by_the_right_bounds():
     rng = np.random.default_rng(1)
     good = rng.chisquare(2, (200, 300))

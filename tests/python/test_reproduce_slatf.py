@@ -7,14 +7,13 @@ import json
 import math
 import re
 import signal
-import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from processes import PATIENCE_S, start_program, wait_until
 from typer.testing import CliRunner, Result
 
 from auvest.cli import app
@@ -345,21 +344,11 @@ def test_ctrl_c_keeps_runs_and_the_same_command_goes_on(tmp_path: Path) -> None:
     options = ["--runs", "300", "--particles", "400", "--no-figure", "--workers", "2"]
     command = [sys.executable, "-m", "auvest", "simulate", "slatf", *options]
     command += ["--output", str(tmp_path / "out")]
-    with subprocess.Popen(
-        command,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        # A shell that runs the tests in the background has them ignore the signal.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    ) as program:
-        deadline = time.monotonic() + 60
-        while time.monotonic() < deadline and program.poll() is None:
-            if len(list((tmp_path / "out" / ".runs").glob("*.npz"))) >= 3:
-                break
-            time.sleep(0.01)
+    with start_program(command) as program:
+        runs = tmp_path / "out" / ".runs"
+        wait_until(lambda: len(list(runs.glob("*.npz"))) >= 3, "three chunks are kept", program)
         program.send_signal(signal.SIGINT)
-        out, err = program.communicate(timeout=60)
+        out, err = program.communicate(timeout=PATIENCE_S)
     assert program.returncode == 130, err
     assert "are done and kept; the same command goes on from there" in plain(err)
     assert "SLATF 2.0" in plain(out)

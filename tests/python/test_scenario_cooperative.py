@@ -25,7 +25,8 @@ def test_same_seed_same_numbers_whatever_the_workers():
     scenario = Scenario(**SHORT, late=0.3, dropout=0.1, timing="own-time")
     a = simulate(slave_filter(), scenario, workers=1)
     b = simulate(slave_filter(), scenario, workers=5)
-    for name in ("error", "covariance", "nis", "weight", "samples", "status"):
+    names = ("error", "covariance", "nis", "weight", "samples", "status")
+    for name in (*names, "taken", "too_late", "lost", "overflowed"):
         assert np.array_equal(getattr(a, name), getattr(b, name), equal_nan=True), name
     c = simulate(slave_filter(), Scenario(**SHORT, late=0.3, dropout=0.1, seed=2))
     assert not np.array_equal(a.error, c.error)
@@ -81,6 +82,31 @@ def test_late_and_lost_messages_cost_information_not_consistency():
         result = simulate(slave_filter("unit"), scenario)
         assert auvest.metrics.nees_consistency(result.nees, 2).consistent
         assert not result.too_late.any()
+
+
+def test_messages_that_are_not_taken_are_counted():
+    def counts(**options):
+        scenario = Scenario(runs=3, steps=1000, timing="own-time", **options)
+        result = simulate(slave_filter("unit"), scenario)
+        assert result.too_late.tolist() == [0, 0, 0]
+        return result.taken, result.lost, result.overflowed
+
+    # Each is complete two ranges after it was measured: all but the last two of 200 arrive.
+    taken, lost, overflowed = counts()
+    assert (taken.tolist(), lost.tolist(), overflowed.tolist()) == ([198] * 3, [0] * 3, [0] * 3)
+
+    taken, lost, overflowed = counts(dropout=1.0)
+    assert (taken.tolist(), lost.tolist(), overflowed.tolist()) == ([0] * 3, [200] * 3, [0] * 3)
+
+    # A range each second that takes 3 to 22 s: up to eight are on their way, at the end too, and
+    # Little's law says how many arrive: 8 of them, 12.5 s each, where there are always eight.
+    assert cooperative.MESSAGES_IN_FLIGHT == 8
+    taken, lost, overflowed = counts(range_every=1, late=1.0, late_steps=20)
+    assert not lost.any()
+    left = 1000 - taken - overflowed
+    assert ((left >= 0) & (left <= 8)).all()
+    assert np.all(taken < 1000 * 8 / 12.5)
+    assert np.all(taken > 1000 * 7 / 12.5)
 
 
 @pytest.mark.parametrize(
