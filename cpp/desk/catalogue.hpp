@@ -82,8 +82,8 @@ void add_models(Catalogue<Scalar>& catalogue);
 
 #define AUVEST_ADD_PROCESS(name, ...) \
   if constexpr (__VA_ARGS__::kStates == N) add_process<__VA_ARGS__>(catalogue, name);
-#define AUVEST_ADD_SENSOR(name, Model, suits) \
-  if constexpr (suits) add_sensor<Model<Scalar, N>>(catalogue, name);
+#define AUVEST_ADD_SENSOR(name, suits, ...) \
+  if constexpr (suits) add_sensor<__VA_ARGS__>(catalogue, name);
 
 /// Defines add_models for n states in both precisions. Needs auvest/registry.hpp.
 #define AUVEST_DEFINE_MODELS(n)                          \

@@ -47,7 +47,7 @@ template <class Scalar>
 struct AnySensor {
   const int states;
   const int size;
-  const int place;          ///< coordinates that say where it stands; 0: it has no place
+  const int place;          ///< numbers that say where it stood or how it was headed; 0: none
   std::string description;  ///< how its owner would make it again
 
   AnySensor(int n, int m, int p) : states(n), size(m), place(p) {}

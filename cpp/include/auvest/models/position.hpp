@@ -22,7 +22,7 @@ struct PositionParams {
   /// Names every member, in the order of stored records: the lower triangle row by row.
   template <class Visitor>
   void visit(Visitor&& v) {
-    static const char* const names[] = {"var_x_m2", "cov_xy_m2", "var_y_m2",
+    static const char* const names[] = {"var_x_m2",  "cov_xy_m2", "var_y_m2",
                                         "cov_xz_m2", "cov_yz_m2", "var_z_m2"};
     for (int i = 0, k = 0; i < M; ++i) {
       for (int j = 0; j <= i; ++j, ++k) v(names[k], covariance_m2(i, j));
