@@ -674,7 +674,8 @@ class GaussianFilter:
     def _as_place(self, place: npt.ArrayLike, handle: _Sensor[Any]) -> Floats:
         if handle.place == 0:
             raise TypeError("place must be None: the place of this sensor is no part of its model")
-        return as_array("place", place, (handle.place,), self._dtype)
+        given = np.atleast_1d(place) if handle.place == 1 else place  # type: ignore[arg-type]
+        return as_array("place", given, (handle.place,), self._dtype)
 
     def _as_places(
         self, place: npt.ArrayLike | None, handles: list[Any], count: int
@@ -684,6 +685,8 @@ class GaussianFilter:
         width = max(handle.place for handle in handles)
         if width == 0:
             raise TypeError("place must be None: the place of this sensor is no part of its model")
+        if width == 1 and np.ndim(place) == 1:
+            place = np.asarray(place)[:, np.newaxis]
         given = as_array("place", place, (None, width), self._dtype, missing=True)
         _require_rows("place", given, count)
         places = np.full((count, _core.MAX_PLACE), np.nan, self._dtype)
