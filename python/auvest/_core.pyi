@@ -147,11 +147,21 @@ MAX_FUNCTION_STATES: int
 MAX_FUNCTION_SIZE: int
 
 def make_function_process(
-    states: int, inputs: int, f: object, Q: object, jacobian: object, angles: Sequence[int],
+    states: int,
+    inputs: int,
+    f: object,
+    Q: object,
+    jacobian: object,
+    angles: Sequence[int],
     raised: list[BaseException],
 ) -> Process_float64: ...
 def make_function_sensor(
-    states: int, size: int, h: object, R: _F64, jacobian: object, angles: Sequence[int],
+    states: int,
+    size: int,
+    h: object,
+    R: _F64,
+    jacobian: object,
+    angles: Sequence[int],
     raised: list[BaseException],
 ) -> Sensor_float64: ...
 
@@ -175,17 +185,13 @@ class _Filter(Generic[_Array], metaclass=_Type):
     def copy(self) -> Self: ...
     def reset(self, x0: _Array, P0: _Array, reference: _Array) -> None: ...
     def predict(self, dt: object, input: object) -> int: ...
-    def update(
-        self, z: object, sensor: _Sensor[_Array], place: object, age_s: object
-    ) -> int: ...
+    def update(self, z: object, sensor: _Sensor[_Array], place: object, age_s: object) -> int: ...
     def feedback(self, reference: object) -> int: ...
     def run(
         self, record: Mapping[str, Any], sensors: list[_Sensor[_Array]], covariance: bool
     ) -> tuple[int, Status, dict[str, Any]]: ...
     def save(self) -> tuple[dict[str, Any], list[str]]: ...
-    def restore(
-        self, state: Mapping[str, Any], sensors: list[_Sensor[_Array] | None]
-    ) -> None: ...
+    def restore(self, state: Mapping[str, Any], sensors: list[_Sensor[_Array] | None]) -> None: ...
     def set_report(self, report: Mapping[str, Any] | None, status: Status) -> None: ...
     @property
     def report(self) -> dict[str, Any] | None: ...
@@ -315,7 +321,10 @@ class Track(metaclass=_Type):
     def position(self) -> _Pair: ...
 
 def simulate_tracking(
-    filter: _Filter[Any], x0: _F32 | _F64, P0: _F32 | _F64, sensor: _Sensor[Any],
+    filter: _Filter[Any],
+    x0: _F32 | _F64,
+    P0: _F32 | _F64,
+    sensor: _Sensor[Any],
     scenario: _ScenarioDict,
 ) -> dict[str, npt.NDArray[Any]]: ...
 

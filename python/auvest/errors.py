@@ -44,7 +44,5 @@ class FilterError(ValueError):
         return _rebuild, (self.action, self.status, self.step, self.partial, self.hint)
 
 
-def _rebuild(
-    action: str, status: Status, step: int | None, partial: Any, hint: str
-) -> FilterError:
+def _rebuild(action: str, status: Status, step: int | None, partial: Any, hint: str) -> FilterError:
     return FilterError(action, status, step=step, partial=partial, hint=hint)

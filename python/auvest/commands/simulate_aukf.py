@@ -232,7 +232,9 @@ def command(
     with terminal.writing(output):
         files = {
             "per_step": write_csv(output / "per_step.csv", per_step),
-            "one_run": write_csv(output / "one_run.csv", one_run(result, filter_.sensors["RangeBearing"])),
+            "one_run": write_csv(
+                output / "one_run.csv", one_run(result, filter_.sensors["RangeBearing"])
+            ),
         }
         if not no_figure:
             files["figure"] = _draw(

@@ -79,7 +79,6 @@ class Model:
         for name in names:
             object.__setattr__(self, name, as_number(name, getattr(self, name), bound))
 
-
     def take_error(self) -> BaseException | None:
         """Give what a function of the model raised since the last time."""
         raised: list[BaseException] = self.__dict__.get("_raised", [])

@@ -405,9 +405,7 @@ class Tracker(Replay):
         if self.filter_name == "aukf":
             policy = interval_policy(self.settings.interval)
             alpha = self.settings.filter.alpha
-            self._filter: Ekf | Ukf = Aukf(
-                x0, P0, policy=policy, alpha=alpha, **models
-            )
+            self._filter: Ekf | Ukf = Aukf(x0, P0, policy=policy, alpha=alpha, **models)
         else:
             self._filter = _build(self.filter_name, self.settings, x0, P0, models)
         self._now, self._started = time, True

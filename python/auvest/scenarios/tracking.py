@@ -344,9 +344,7 @@ def simulate(
     core, sensor, x0, p0 = filter._core_filter(policy), station(filter), filter.x, filter.P
 
     def part(first: int, count: int) -> dict[str, npt.NDArray[Any]]:
-        return _core.simulate_tracking(
-            core, x0, p0, sensor, _as_core(scenario, first, count)
-        )
+        return _core.simulate_tracking(core, x0, p0, sensor, _as_core(scenario, first, count))
 
     try:
         columns = montecarlo.run(
