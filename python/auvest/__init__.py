@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from auvest.models import Position as Position
     from auvest.models import ProcessModel as ProcessModel
     from auvest.models import RangeBearing as RangeBearing
+    from auvest.models import RangeBearingElevation as RangeBearingElevation
     from auvest.models import SpeedHeading as SpeedHeading
     from auvest.models import WhiteAcceleration as WhiteAcceleration
     from auvest.slat import UNKNOWN_MASTER as UNKNOWN_MASTER
@@ -99,6 +100,7 @@ else:
         "Position": "models",
         "ProcessModel": "models",
         "RangeBearing": "models",
+        "RangeBearingElevation": "models",
         "RejectionStreak": "kernels",
         "Report": "filters",
         "RobustEkf": "filters",

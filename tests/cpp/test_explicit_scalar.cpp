@@ -204,6 +204,16 @@ auvest::Vector<Scalar, 6> run_in_space() {
     REQUIRE(filter.update(fix, auvest::Position<Scalar, 6, 3>()).status == auvest::Status::kOk);
     REQUIRE(filter.update(depth, auvest::Depth<Scalar, 6>()).status == auvest::Status::kOk);
     REQUIRE(filter.update(velocity, log).status == auvest::Status::kOk);
+    auvest::RangeBearingElevation<Scalar, 6> usbl;
+    usbl.params.near_field = Scalar(k % 2 == 0 ? 5 : 1000);  // far and near
+    REQUIRE(usbl.check() == auvest::Status::kOk);
+    auvest::Vector<Scalar, 3> angles;
+    angles(0) = Scalar(54);
+    angles(1) = Scalar(-0.9 + 0.005 * k);
+    angles(2) = Scalar(0.38);
+    const auto seen = filter.update(angles, usbl);
+    REQUIRE(seen.status == auvest::Status::kOk);
+    CHECK(seen.near_field == (k % 2 != 0));
   }
   return filter.x();
 }

@@ -26,6 +26,7 @@
 #include "auvest/models/piecewise_acceleration.hpp"
 #include "auvest/models/position.hpp"
 #include "auvest/models/range_bearing.hpp"
+#include "auvest/models/range_bearing_elevation.hpp"
 #include "auvest/models/slave_motion.hpp"
 #include "auvest/models/sonar.hpp"
 #include "auvest/models/speed_heading.hpp"

@@ -14,6 +14,7 @@
 #include "auvest/models/odometry.hpp"
 #include "auvest/models/position.hpp"
 #include "auvest/models/range_bearing.hpp"
+#include "auvest/models/range_bearing_elevation.hpp"
 #include "auvest/models/speed_heading.hpp"
 #include "auvest/models/white_acceleration.hpp"
 
@@ -35,4 +36,5 @@
   X("Position3", N == 6, Position<Scalar, N, 3>)                   \
   X("Depth", N == 6, Depth<Scalar, N>)                             \
   X("BodyVelocity2", N == 4 || N == 6, BodyVelocity<Scalar, N, 2>) \
-  X("BodyVelocity3", N == 6, BodyVelocity<Scalar, N, 3>)
+  X("BodyVelocity3", N == 6, BodyVelocity<Scalar, N, 3>)           \
+  X("RangeBearingElevation", N == 6, RangeBearingElevation<Scalar, N>)

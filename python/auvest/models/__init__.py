@@ -13,15 +13,18 @@ from auvest.models.leader_range import LeaderRange
 from auvest.models.odometry import Odometry
 from auvest.models.position import Position
 from auvest.models.range_bearing import RangeBearing
+from auvest.models.range_bearing_elevation import RangeBearingElevation
 from auvest.models.speed_heading import SpeedHeading
 from auvest.models.white_acceleration import WhiteAcceleration
 
 #: Every process and every sensor, by the name of its class.
 PROCESSES: dict[str, type[ProcessModel]] = {
-    model.__name__: model for model in (ConstantAcceleration, Odometry, SpeedHeading, WhiteAcceleration)
+    model.__name__: model
+    for model in (ConstantAcceleration, Odometry, SpeedHeading, WhiteAcceleration)
 }
 SENSORS: dict[str, type[MeasurementModel]] = {
-    model.__name__: model for model in (BodyVelocity, Depth, LeaderRange, Position, RangeBearing)
+    model.__name__: model
+    for model in (BodyVelocity, Depth, LeaderRange, Position, RangeBearing, RangeBearingElevation)
 }
 
 
@@ -60,6 +63,7 @@ __all__ = [
     "Position",
     "ProcessModel",
     "RangeBearing",
+    "RangeBearingElevation",
     "SpeedHeading",
     "WhiteAcceleration",
     "from_description",
