@@ -321,7 +321,7 @@ class Track(metaclass=_Type):
     def position(self) -> _Pair: ...
 
 def simulate_tracking(
-    filter: _Filter[Any],
+    filter: _Filter[Any],  # noqa: A002
     x0: _F32 | _F64,
     P0: _F32 | _F64,
     sensor: _Sensor[Any],

@@ -8,12 +8,8 @@ disagree).
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
-from typing import Any
-
-_PROCESSES = ("ConstantAcceleration", "Odometry", "SpeedHeading", "WhiteAcceleration")
-_SENSORS = ("BodyVelocity", "Depth", "LeaderRange", "Position", "RangeBearing")
-_MOTIONS = ("CompassMotion", "UnicycleMotion")
+from dataclasses import dataclass
+from typing import Any, Literal
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,10 +24,9 @@ class Filter:
         Its class in the package.
     title : str
         As pages and pictures name it.
-    processes, sensors : tuple of str
-        Classes of the models that it takes.
-    kernel, policy : bool
-        Whether it takes a robust kernel, an interval policy.
+    family : {"gaussian", "slat"}
+        The Kalman filters take any process and sensor, a robust kernel and an interval policy;
+        those that localise and track take a motion and a sonar.
     replay, chip, parity, budget : bool
         Whether ``auvest replay`` takes it; whether it is built for the vehicle; whether the parity
         tests show the same bits on every target; whether docs/budgets.md has what it costs there.
@@ -42,10 +37,7 @@ class Filter:
     name: str
     cls: str
     title: str
-    processes: tuple[str, ...]
-    sensors: tuple[str, ...]
-    kernel: bool = False
-    policy: bool = False
+    family: Literal["gaussian", "slat"]
     replay: bool = False
     chip: bool = False
     parity: bool = False
@@ -54,48 +46,59 @@ class Filter:
 
     def row(self) -> dict[str, Any]:
         """Give what ``auvest filters --json`` prints of it."""
-        return {"name": self.name, "python": True, **asdict(self)}
+        return {
+            "name": self.name,
+            "class": self.cls,
+            "title": self.title,
+            "python": True,
+            "replay": self.replay,
+            "chip": self.chip,
+            "parity": self.parity,
+            "budget": self.budget,
+            "processes": self.processes,
+            "sensors": self.sensors,
+            "kernel": self.family == "gaussian",
+            "policy": self.family == "gaussian",
+            "note": self.note,
+        }
+
+    @property
+    def processes(self) -> list[str]:
+        """Classes of the processes that it takes."""
+        if self.family == "slat":
+            return ["CompassMotion", "UnicycleMotion"]
+        from auvest.models import PROCESSES
+
+        return sorted(PROCESSES)
+
+    @property
+    def sensors(self) -> list[str]:
+        """Classes of the sensors that it takes."""
+        if self.family == "slat":
+            return ["Sonar"]
+        from auvest.models import SENSORS
+
+        return sorted(SENSORS)
 
 
-def _gaussian(name: str, cls: str, title: str, **where: Any) -> Filter:
-    return Filter(
-        name=name,
-        cls=cls,
-        title=title,
-        processes=_PROCESSES,
-        sensors=_SENSORS,
-        kernel=True,
-        policy=True,
-        **where,
-    )
-
-
-def _slat(name: str, cls: str, title: str, **where: Any) -> Filter:
-    return Filter(
-        name=name, cls=cls, title=title, processes=_MOTIONS, sensors=("Sonar",), **where
-    )
-
+_EVERYWHERE = {"chip": True, "parity": True, "budget": True}
+_NO_RECORD = "no record of it is replayed on the targets yet"
 
 FILTERS: dict[str, Filter] = {
-    entry.name: entry
-    for entry in (
-        _gaussian("ekf", "Ekf", "EKF", replay=True, chip=True, parity=True, budget=True),
-        _gaussian("ukf", "Ukf", "UKF", replay=True, chip=True, parity=True, budget=True),
-        _gaussian("aukf", "Aukf", "AUKF", replay=True, chip=True, parity=True, budget=True),
-        _gaussian(
-            "robust-ekf", "RobustEkf", "robust EKF",
-            replay=True, chip=True, parity=True, budget=True,
-        ),
-        _gaussian(
-            "robust-ukf", "RobustUkf", "robust UKF", replay=True, note="no record of it is replayed"
-        ),
-        _slat("slatf1", "Slatf", "SLATF 1.0", chip=True, parity=True, budget=True),
-        _slat("slatf2", "Slatf", "SLATF 2.0", chip=True, parity=True, budget=True),
-        _slat("slatf-joint", "SlatfJoint", "SLATF, joint", note="no record of it is replayed"),
-        _slat("ekf-slat", "EkfSlat", "EKF-SLAT", note="no record of it is replayed"),
-        _slat(
-            "dead-reckoning", "DeadReckoning", "dead reckoning",
-            note="what the others are compared with",
+    name: Filter(name=name, cls=cls, title=title, family=family, **where)
+    for name, cls, title, family, where in (
+        ("ekf", "Ekf", "EKF", "gaussian", {"replay": True, **_EVERYWHERE}),
+        ("ukf", "Ukf", "UKF", "gaussian", {"replay": True, **_EVERYWHERE}),
+        ("aukf", "Aukf", "AUKF", "gaussian", {"replay": True, **_EVERYWHERE}),
+        ("robust-ekf", "RobustEkf", "robust EKF", "gaussian", {"replay": True, **_EVERYWHERE}),
+        ("robust-ukf", "RobustUkf", "robust UKF", "gaussian", {"replay": True, "note": _NO_RECORD}),
+        ("slatf1", "Slatf", "SLATF 1.0", "slat", _EVERYWHERE),
+        ("slatf2", "Slatf", "SLATF 2.0", "slat", _EVERYWHERE),
+        ("slatf-joint", "SlatfJoint", "SLATF, joint", "slat", {"note": _NO_RECORD}),
+        ("ekf-slat", "EkfSlat", "EKF-SLAT", "slat", {"note": _NO_RECORD}),
+        (
+            "dead-reckoning", "DeadReckoning", "dead reckoning", "slat",
+            {"note": "what the others are compared with"},
         ),
     )
 }  # fmt: skip

@@ -14,7 +14,7 @@ _DEFAULTS = _core.sensor_defaults("BodyVelocity3")
 
 @dataclass(frozen=True, kw_only=True)
 class BodyVelocity(MeasurementModel):
-    """Velocity over ground, forward and sideways and (3 axes) along z, m/s, with pitch and roll out.
+    """Velocity over ground, forward, sideways and (3 axes) along z, m/s, with pitch and roll out.
 
     For processes whose state is position, then velocity. Sideways is 90 degrees from forward, from
     +x towards +y.
@@ -26,8 +26,8 @@ class BodyVelocity(MeasurementModel):
     heading_rad : float
         From +x towards +y, when it was measured; ``place`` in ``update`` and ``run`` replaces it.
     sigma_forward_m_s, sigma_sideways_m_s, sigma_vertical_m_s : float
-        Standard deviations, m/s, positive. An error of the heading turns the velocity: add it, times
-        the speed, in squares to ``sigma_sideways_m_s``.
+        Standard deviations, m/s, positive. An error of the heading turns the velocity: add it,
+        times the speed, in squares to ``sigma_sideways_m_s``.
 
     Raises
     ------
