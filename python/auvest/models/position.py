@@ -21,8 +21,8 @@ class Position(MeasurementModel):
     ----------
     covariance_m2 : array_like, shape (2, 2) or (3, 3)
         Covariance of the fix, m^2, symmetric positive definite; 3 numbers need a process whose
-        state begins with ``x, y, z``. A fix is one model: where the covariance changes from fix to fix,
-        give ``update`` a new one.
+        state begins with ``x, y, z``. A fix is one model: where the covariance changes from fix to
+        fix, give ``update`` a new one.
 
     Raises
     ------
