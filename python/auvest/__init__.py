@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from auvest.filters import RobustUkf as RobustUkf
     from auvest.filters import RunResult as RunResult
     from auvest.filters import Ukf as Ukf
+    from auvest.filters.ckf import Ckf as Ckf
     from auvest.intervals import CovarianceBudget as CovarianceBudget
     from auvest.intervals import FixedInterval as FixedInterval
     from auvest.intervals import MahalanobisInterval as MahalanobisInterval
@@ -73,6 +74,7 @@ else:
     _HOME = {
         "Aukf": "filters",
         "BodyVelocity": "models",
+        "Ckf": "filters.ckf",
         "CompassMotion": "slat_models",
         "ConstantAcceleration": "models",
         "ConstantVelocity": "slat_models",

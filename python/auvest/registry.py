@@ -89,6 +89,7 @@ FILTERS: dict[str, Filter] = {
     for name, cls, title, family, where in (
         ("ekf", "Ekf", "EKF", "gaussian", {"replay": True, **_EVERYWHERE}),
         ("ukf", "Ukf", "UKF", "gaussian", {"replay": True, **_EVERYWHERE}),
+        ("ckf", "Ckf", "CKF", "gaussian", {"note": _NO_RECORD}),
         ("aukf", "Aukf", "AUKF", "gaussian", {"replay": True, **_EVERYWHERE}),
         ("robust-ekf", "RobustEkf", "robust EKF", "gaussian", {"replay": True, **_EVERYWHERE}),
         ("robust-ukf", "RobustUkf", "robust UKF", "gaussian", {"replay": True, "note": _NO_RECORD}),

@@ -5,6 +5,7 @@
 
 #include "auvest/filters/adaptive_interval.hpp"
 #include "auvest/filters/aukf.hpp"
+#include "auvest/filters/ckf.hpp"
 #include "auvest/filters/ekf.hpp"
 #include "auvest/filters/imm.hpp"
 #include "auvest/filters/late_updates.hpp"
