@@ -252,6 +252,31 @@ TEST_CASE("EKF-SLAT: a result that would not be finite is refused, with all echo
   CHECK(slat.belief().P(2, 2) < before.P(2, 2));
 }
 
+TEST_CASE("EKF-SLAT: a gate that is negative or not finite is refused, and so is a bad model") {
+  using Filter = auvest::EkfSlat<Compass<double>, Master<double>, 1>;
+  Random random(5);
+  Belief<double, 2> start;
+  start.x.setZero();
+  start.P.setIdentity();
+  Filter::Params params;
+  for (const double gate : {-0.1, std::nan(""), HUGE_VAL}) {
+    params.gate = gate;
+    Filter filter((Compass<double>()), Master<double>(), params);
+    CHECK(filter.reset(start, random) == Status::kBadParameter);
+  }
+  for (const double gate : {0.0, 16.0}) {
+    params.gate = gate;
+    Filter filter((Compass<double>()), Master<double>(), params);
+    CHECK(filter.reset(start, random) == Status::kOk);
+  }
+  Compass<double>::Params motion;
+  motion.sigma_heading_rad = std::nan("");
+  Filter filter((Compass<double>(motion)), Master<double>());
+  CHECK(filter.reset(start, random) == Status::kBadParameter);
+  auvest::DeadReckoning<Compass<double>> reckoning((Compass<double>(motion)));
+  CHECK(reckoning.reset(start, random) == Status::kBadParameter);
+}
+
 TEST_CASE("dead reckoning: the paper's bias in section 7 and its compensation") {
   for (const bool compensate : {false, true}) {
     Compass<double>::Params motion;

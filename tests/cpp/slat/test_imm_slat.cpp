@@ -562,6 +562,12 @@ TEST_CASE("EKF-SLAT with an Imm: what is refused leaves it as it was") {
   none.share << 0, 0, 0;
   Filter bad{Unicycle<double>(), Three<double>(none)};
   CHECK(bad.reset(slave_belief<double>(0.01), random) == Status::kBadParameter);
+  for (const double gate : {-0.1, std::nan(""), HUGE_VAL}) {
+    Filter::Params params;
+    params.gate = gate;
+    Filter gated(Unicycle<double>(), three_models<double>(0.1), params);
+    CHECK(gated.reset(slave_belief<double>(0.01), random) == Status::kBadParameter);
+  }
 }
 
 }  // namespace

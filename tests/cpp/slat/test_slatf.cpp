@@ -290,6 +290,33 @@ TEST_CASE_TEMPLATE("SLATF: refused calls leave all bits", Filter,
   CHECK(owner.storage == before);
 }
 
+TEST_CASE("SLATF: parameters out of their range are refused, those at its ends are not") {
+  using Params = auvest::SlatfParams<float>;
+  const auto status = [](float Params::*member, float value) {
+    Params params;
+    params.gate = 16;
+    params.*member = value;
+    Owner<auvest::Slatf1<Compass<float>, Master<float>, 1>> owner((Compass<float>()),
+                                                                  Master<float>(), 5, params);
+    Random random(1);
+    Belief<float, 2> start;
+    start.x.setZero();
+    start.P.setZero();
+    return owner.filter.reset(start, random);
+  };
+  for (const float bad : {-0.1f, std::nanf(""), INFINITY}) {
+    CHECK(status(&Params::resample_below, bad) == Status::kBadParameter);
+    CHECK(status(&Params::gate, bad) == Status::kBadParameter);
+    CHECK(status(&Params::birth_velocity_mps, bad) == Status::kBadParameter);
+    CHECK(status(&Params::birth_acceleration_mps2, bad) == Status::kBadParameter);
+  }
+  for (const float end : {0.0f, 1.0f}) CHECK(status(&Params::resample_below, end) == Status::kOk);
+  CHECK(status(&Params::resample_below, 1.001f) == Status::kBadParameter);
+  CHECK(status(&Params::gate, 0) == Status::kOk);
+  CHECK(status(&Params::birth_velocity_mps, 0) == Status::kOk);
+  CHECK(status(&Params::birth_acceleration_mps2, 0) == Status::kBadParameter);
+}
+
 TEST_CASE("SLATF: planned velocity changes move the master as Eq. (4) says") {
   using Filter = auvest::Slatf1<Compass<double>, Master<double>, 2>;
   Owner<Filter> owner((Compass<double>()), Master<double>(), 5);
