@@ -165,6 +165,27 @@ TEST_CASE("unicycle motion: one step's noise has rank 2, the heading stays wrapp
   CHECK(x(2) == close_to(3.3 - auvest::math::two_pi<double>(), 1e-12));
 }
 
+TEST_CASE("unicycle motion: the headings of samples stay wrapped through many turns") {
+  const Unicycle motion;
+  const double pi = auvest::math::pi<double>();
+  Random random(34);
+  const auto step = motion.step(Vector<double, 2>(1, 0.4), 0.5);
+  for (int particle = 0; particle < 5; ++particle) {
+    Vector<double, 3> pose(0, 0, 0.5 * particle);
+    double turned = pose(2);  // the same without wrapping
+    for (int k = 0; k < 1000; ++k) {
+      double a, b;
+      random.normal_pair(a, b);
+      motion.sample(step, a, b, pose);
+      turned += 0.5 * (0.4 + motion.params.sigma_yaw_rate_radps * b);
+      CHECK(pose(2) > -pi);
+      CHECK(pose(2) <= pi);
+      CHECK(std::fabs(auvest::math::wrap(pose(2) - turned)) < 1e-11);
+    }
+    CHECK(turned > 30 * 2 * pi);
+  }
+}
+
 TEST_CASE("slave motion: bad parameters") {
   using auvest::Status;
   const auto compass = [](double speed, double heading) {

@@ -359,4 +359,21 @@ TEST_CASE("outage: starts from the last shared state, hands over when communicat
   CHECK(outage.mode() == auvest::Communication::kDown);
 }
 
+TEST_CASE("outage: the filter has the masters that were shared last, no more") {
+  using Filter = auvest::EkfSlat<Compass<double>, Master<double>, 2>;
+  auvest::Outage<Filter, 2> outage(Filter((Compass<double>()), Master<double>()));
+  Random random(6);
+  Belief<double, 2> slave;
+  slave.x << 7, 8;
+  slave.P.setIdentity();
+  const Belief<double, 6> masters[2] = {master_belief<double>(100, 200),
+                                        master_belief<double>(-100, 50)};
+  const Vector<double, 2> u(5, 0.2);
+  for (const int count : {2, 1, 0, 2}) {
+    REQUIRE(outage.share(slave, masters, count) == Status::kOk);
+    REQUIRE(outage.predict(1, u, random) == Status::kOk);
+    CHECK(outage.filter().masters() == count);
+  }
+}
+
 }  // namespace
