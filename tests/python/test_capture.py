@@ -109,6 +109,17 @@ def test_numbers_keep_their_bits() -> None:
     assert math.isnan(row["e"])  # what Arduino prints for more than 2^32
 
 
+@pytest.mark.parametrize(
+    "name",
+    ["sample", "time_s", "resamplings", "status", "missed", "refused", "late", "awake_us"],
+)
+def test_eight_digits_of_a_count_are_a_number_and_of_a_float_its_bits(name: str) -> None:
+    reader = Reader("SLAVE")
+    reader.read(f"# columns: {name},speed_m_s")
+    row = reader.read(telemetry.frame("SLAVE,40490000,40490000"))
+    assert row == {name: 40490000.0, "speed_m_s": 3.140625}  # 2 (1 + 0x490000 / 2^23)
+
+
 def test_samples_need_the_names_of_their_columns() -> None:
     reader = Reader()
     with pytest.raises(LineError, match="reset the board"):

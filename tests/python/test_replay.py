@@ -307,6 +307,90 @@ def test_every_range_is_accounted_for(tmp_path: Path) -> None:
     np.testing.assert_allclose(held[[5, 10]], 0.0, atol=1e-9)
 
 
+def standing_log(folder: Path, *, start_s: float, ranges: list[tuple[float, float]]) -> None:
+    """A craft that stands at (1, 2), 10 m from its only beacon, and takes these ranges."""
+    time_s = np.arange(-2.0, 11.0)
+    write_file(folder, "odometry.csv", time_s=time_s, forward_m=0 * time_s, left_m=0 * time_s,
+               turn_rad=0 * time_s)  # fmt: skip
+    start(folder, time_s=start_s)
+    write_file(folder, "beacons.csv", source=[3], x_m=[11.0], y_m=[2.0])
+    times, sizes = zip(*ranges, strict=True)
+    write_file(folder, "ranges.csv", time_s=times, source=[3] * len(times), range_m=sizes)
+
+
+def test_a_range_at_the_start_and_one_at_the_end_are_used(tmp_path: Path) -> None:
+    cases = [(1.499, 10.0), (1.5, 10.5), (10.0, 9.0), (10.001, 10.0)]
+    standing_log(tmp_path, start_s=1.5, ranges=cases)
+    tables = run(tmp_path, settings_from(SURE), "ekf")
+    assert outcomes(tables) == ["before start", "accepted", "accepted", "after end"]
+    # Measured less expected.
+    np.testing.assert_allclose(
+        tables["measurements"]["innovation_0"][1:3], [0.5, -1.0], rtol=0, atol=1e-9
+    )
+
+
+def test_a_held_out_range_says_how_much_too_long_the_prediction_was(tmp_path: Path) -> None:
+    cases = [(1.0, 10.0), (2.0, 8.0), (3.0, 11.5), (6.0, 10.0)]
+    standing_log(tmp_path, start_s=0.0, ranges=cases)
+    settings = settings_from({**SURE, "ranges": {"every_s": 5.0}})
+    tables = run(tmp_path, settings, "ekf")
+    assert outcomes(tables) == ["accepted", "held out", "held out", "accepted"]
+    held = tables["measurements"]["held_out_error_m"]
+    np.testing.assert_allclose(held[1:3], [2.0, -1.5], rtol=0, atol=1e-9)
+    numbers = replay(LogFolder(tmp_path), settings, filter_name="ekf").numbers
+    assert numbers["held_out_rmse_m"] == pytest.approx(math.sqrt((4 + 2.25) / 2))
+
+
+def test_an_increment_that_ends_at_the_start_is_left_out(tmp_path: Path) -> None:
+    """The craft starts at (1, 2) towards +x when its second increment ends."""
+    standing_log(tmp_path, start_s=1.0, ranges=[(3.0, 8.0)])
+    write_file(tmp_path, "odometry.csv", time_s=[0.5, 1.0, 2.0, 3.0],
+               forward_m=[100.0, 50.0, 1.5, 0.5], left_m=[0.0] * 4, turn_rad=[0.0] * 4)  # fmt: skip
+    estimates = run(tmp_path, settings_from(SURE), "ekf")["estimates"]
+    np.testing.assert_array_equal(estimates["time_s"], [2.0, 3.0])
+    np.testing.assert_allclose(estimates["dead_reckoned_x_m"], [2.5, 3.0], rtol=1e-12)
+    np.testing.assert_array_equal(estimates["dead_reckoned_y_m"], 2.0)
+
+
+@pytest.mark.parametrize("lines", [1, 100])
+def test_velocities_before_the_start_count_as_the_last_of_them_at_the_start(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lines: int
+) -> None:
+    monkeypatch.setattr(reader, "CHUNK_LINES", lines)
+    tables = []
+    for name, time_s, speed in (
+        ("before", [-3.0, -1.0, 2.0], [7.0, 1.0, 0.5]),
+        ("at", [0.0, 2.0], [1.0, 0.5]),
+    ):
+        folder = tmp_path / name
+        standing_log(folder, start_s=0.0, ranges=[(1.0, 9.0), (4.0, 7.0)])
+        write_file(folder, "odometry.csv", time_s=time_s, speed_m_s=speed,
+                   yaw_rate_rad_s=[0.0] * len(speed))  # fmt: skip
+        tables.append(run(folder, settings_from(SURE), "ekf"))
+    before, at = tables
+    # 1 m/s for 2 s, then 0.5 m/s for 2 s, from x = 1 on.
+    assert before["estimates"]["dead_reckoned_x_m"][-1] == pytest.approx(4.0)
+    np.testing.assert_allclose(before["measurements"]["innovation_0"], 0.0, atol=1e-9)
+    for name in ESTIMATES:
+        np.testing.assert_array_equal(before["estimates"][name], at["estimates"][name], name)
+
+
+@pytest.mark.parametrize(("sigma_m", "expected"), [(None, 1.5), (0.0, 1.5), (2.0, 2.5)])
+def test_a_leaders_sigma_adds_to_that_of_the_range(
+    tmp_path: Path, sigma_m: float | None, expected: float
+) -> None:
+    """Where the craft knows its place, S is R: 1.5^2, and 1.5^2 + 2^2 = 2.5^2."""
+    standing_log(tmp_path, start_s=0.0, ranges=[(2.0, 10.0)])
+    (tmp_path / "beacons.csv").unlink()
+    known = {} if sigma_m is None else {"sigma_m": [sigma_m] * 3}
+    write_file(tmp_path, "leaders.csv", time_s=[1.0, 2.0, 3.0], source=[3] * 3, x_m=[11.0] * 3,
+               y_m=[2.0] * 3, **known)  # fmt: skip
+    settings = settings_from({**SURE, "ranges": {"sigma_m": 1.5}})
+    measured = run(tmp_path, settings, "ekf")["measurements"]
+    assert measured["outcome"].tolist() == ["accepted"]
+    assert measured["sigma_0"][0] == pytest.approx(expected, rel=1e-9)
+
+
 def test_late_ranges_give_the_same_as_ranges_in_time(tmp_path: Path) -> None:
     log = increments_log(tmp_path / "in_time")
     increments_log(tmp_path / "late")
