@@ -7,11 +7,11 @@ import re
 import numpy as np
 import pytest
 from conftest import ROOT
+from result_support import tracking_result
 from typer.testing import CliRunner
 
 from auvest.cli import app
 from auvest.reproduce import intervals
-from auvest.scenarios.tracking import Scenario, TrackingResult
 
 PAGE = ROOT / "docs" / "reproduction" / "intervals"
 
@@ -60,25 +60,14 @@ def test_the_rmse_is_compared_with_the_best():
 
 def test_the_figures_of_a_policy_by_hand():
     """Two runs: 1 and 3 of 10 probes above; 10 m^2 in 20 probes; 24 s in 8 samples."""
-    runs, steps = 2, 5
-    blank = np.full((runs, steps), np.nan)
-    time_s = np.array([[2.0, 4.0, 6.0, 8.0, 10.0], [5.0, 10.0, 14.0, np.nan, np.nan]])
-    result = TrackingResult(
-        time_s=time_s,
-        interval_s=blank,
-        truth=np.zeros((runs, steps, 2)),
-        z=np.zeros((runs, steps, 2)),
-        x=np.zeros((runs, steps, 6)),
-        position_covariance=np.zeros((runs, steps, 2, 2)),
-        nis=blank,
-        tau=blank,
-        mahalanobis_squared=blank,
+    result = tracking_result(
+        np.zeros((2, 5, 2)),
+        time_s=np.array([[2.0, 4.0, 6.0, 8.0, 10.0], [5.0, 10.0, 14.0, np.nan, np.nan]]),
         samples=np.array([5, 3]),
-        status=np.array([0, 1], np.uint8),
+        status=np.array([0, 1]),
         probe_square_sum=np.array([4.0, 6.0]),
         probe_above=np.array([1.0, 3.0]),
         probe_count=np.array([10.0, 10.0]),
-        scenario=Scenario(runs=runs, steps=steps),
     )
     got = intervals._figures(result)
     assert got.interval_s == pytest.approx(3.0)

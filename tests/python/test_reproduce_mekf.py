@@ -8,6 +8,7 @@ import re
 import numpy as np
 import pytest
 from conftest import ROOT
+from result_support import cooperative_result
 from typer.testing import CliRunner
 
 from auvest import metrics
@@ -91,34 +92,24 @@ def test_reproduce_writes_its_files_and_one_json_object(tmp_path, monkeypatch):
                      "consistency.png", "fig05.csv", "fig06.csv", "kernels.csv"}  # fmt: skip
 
 
-def made_up(error, weight=None, recoveries=0, too_late=0, status=0):
-    """A result with these errors (runs, steps, 2) and a claimed sigma of 1 m along each axis."""
-    error = np.asarray(error, dtype=float)
-    runs, steps, _ = error.shape
-    return cooperative.Result(
-        error=error,
-        covariance=np.broadcast_to(np.eye(2), (runs, steps, 2, 2)),
-        nis=np.full((runs, steps), np.nan),
-        weight=np.full((runs, steps), np.nan) if weight is None else np.asarray(weight, float),
-        samples=np.full(runs, steps),
-        recoveries=np.full(runs, recoveries),
-        too_late=np.full(runs, too_late),
-        status=np.full(runs, status, np.uint8),
-        scenario=cooperative.Scenario(runs=runs, steps=steps),
-    )
-
-
 NAN = np.nan
 
 
 def test_a_score_by_hand():
     error = [[[3, 4], [0, 0]], [[0, 0], [0, 0]]]
     weight = [[0.0, NAN], [0.5, 1.0]]
-    score = mekf.score(made_up(error, weight, recoveries=2, too_late=3, status=1))
+    result = cooperative_result(
+        error,
+        weight=np.array(weight),
+        recoveries=np.array([0, 2]),
+        too_late=np.array([3, 1]),
+        status=np.array([0, 1]),
+    )
+    score = mekf.score(result)
     assert score.rmse_m == 2.5  # the root of 25 / 4
     assert score.rejected == pytest.approx(1 / 3)  # of the ranges that were there
-    assert (score.recoveries, score.too_late, score.failed_runs) == (4, 6, 2)
-    assert np.isnan(mekf.score(made_up(error)).rejected)
+    assert (score.recoveries, score.too_late, score.failed_runs) == (2, 4, 1)
+    assert np.isnan(mekf.score(cooperative_result(error)).rejected)
 
 
 def test_error_over_time_is_the_root_of_the_mean_over_runs_and_bins():
@@ -128,13 +119,13 @@ def test_error_over_time_is_the_root_of_the_mean_over_runs_and_bins():
     error[0, : mekf.BIN] = 3.0, 4.0  # 25 in one run and 0 in the other
     error[:, mekf.BIN : 2 * mekf.BIN, 1] = 2.0
     error[:, 2 * mekf.BIN :] = 99.0
-    over = mekf.over_time({"ekf": made_up(2 * error), "igg": made_up(error)})
+    over = mekf.over_time({"ekf": cooperative_result(2 * error), "igg": cooperative_result(error)})
     assert over.time_h * 3600 == pytest.approx([60.0, 180.0])
     assert over.rms_m["igg"] == pytest.approx([np.sqrt(12.5), 2.0])
     assert over.improvement == pytest.approx([0.5, 0.5])
     assert np.array_equal(over.errors["igg"], error[0])
     # A short run is one bin.
-    short = mekf.over_time({name: made_up(error[:, :50]) for name in ("ekf", "igg")})
+    short = mekf.over_time({name: cooperative_result(error[:, :50]) for name in ("ekf", "igg")})
     assert short.time_h * 3600 == pytest.approx([25.0])
 
 
@@ -145,7 +136,7 @@ def ranged(distance_m, ranges):
     weight[0, list(ranges)] = 1.0
     error = np.zeros((1, steps, 2))
     error[0, :, 0] = distance_m
-    return made_up(error, weight)
+    return cooperative_result(error, weight=weight)
 
 
 def test_a_displaced_run_is_back_when_it_is_within_three_sigma_after_a_range():
@@ -193,7 +184,9 @@ def made_up_reproduction(**changes):
             for k, kind in enumerate(cooperative.TIMINGS)
         },
         "worlds": {"clean": {name: score(1.0) for name in mekf.KERNELS}},
-        "over_time": mekf.over_time({n: made_up(np.ones((1, 9, 2))) for n in ("ekf", "igg")}),
+        "over_time": mekf.over_time(
+            {n: cooperative_result(np.ones((1, 9, 2))) for n in ("ekf", "igg")}
+        ),
         "consistency": [judged(), judged(q=4.0, mean=1.0), judged(r=0.25, mean=3.0)],
         "displaced": {"igg, recovery": displaced, "igg, no recovery": lost, "huber": displaced},
         "displaced_runs": 12,

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from result_support import slat_result
 from typer.testing import CliRunner, Result
 
 from auvest.cli import app
@@ -195,31 +196,9 @@ def test_workers_and_progress(small: slatf.Reproduction) -> None:
     assert [done for done, _ in calls] == sorted(done for done, _ in calls)
 
 
-def made_up(error: Any, covariance: Any = None) -> slat.SlatResult:
-    """A result with these errors (runs, pings, 2); nobody simulated it."""
-    e = np.asarray(error, dtype=float)
-    runs, pings, _ = e.shape
-    blank, none = np.zeros((runs, pings)), np.zeros(runs, int)
-    return slat.SlatResult(
-        time_s=2.0 * np.arange(1, pings + 1),
-        truth=np.zeros((pings, 2)),
-        masters=np.zeros((pings, 1, 2)),
-        error=e,
-        covariance=np.zeros((runs, pings, 2, 2)) if covariance is None else covariance,
-        master_error=np.zeros((runs, pings, 1, 2)),
-        effective_size=blank,
-        nis=blank,
-        resamplings=none,
-        heard=none,
-        log_likelihood=np.zeros(runs),
-        status=np.zeros(runs, np.uint8),
-        scenario=slat.SlatScenario(runs=runs, duration_s=2.0 * pings),
-    )
-
-
 def test_the_figures_of_a_result_by_hand() -> None:
     """Distances of 5 and 1 m in one run, 7 and 7 m in the other."""
-    result = made_up([[[3, -4], [0, 1]], [[7, 0], [0, -7]]])
+    result = slat_result([[[3, -4], [0, 1]], [[7, 0], [0, -7]]])
     roots = (math.sqrt(13), 7.0)
     rmse = slatf.rmse(result)
     assert rmse.value == pytest.approx(sum(roots) / 2)
@@ -231,9 +210,9 @@ def test_the_figures_of_a_result_by_hand() -> None:
 
 def test_a_difference_is_that_of_paired_runs() -> None:
     """Of 5 and 8 m against 4 and 5 m: 1 and 3 m, 2 m with a standard error of 1 m."""
-    a, b = made_up([[[3, 4]], [[0, 8]]]), made_up([[[4, 0]], [[0, 5]]])
+    a, b = slat_result([[[3, 4]], [[0, 8]]]), slat_result([[[4, 0]], [[0, 5]]])
     assert slatf.difference(a, b) == slatf.Estimate(pytest.approx(2.0), pytest.approx(1.0))
-    one = slatf.difference(made_up([[[3, 4]]]), made_up([[[0, 1]]]))
+    one = slatf.difference(slat_result([[[3, 4]]]), slat_result([[[0, 1]]]))
     assert one.value == pytest.approx(4.0)
     assert math.isnan(one.standard_error)
 

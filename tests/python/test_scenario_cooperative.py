@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from result_support import cooperative_result
 
 import auvest
 from auvest.scenarios import cooperative
@@ -113,41 +114,23 @@ def test_float32_runs_too():
     assert result.rmse_m == pytest.approx(wanted.rmse_m, rel=1e-2)
 
 
-def made_up(error, covariance=None):
-    """A result of runs (runs, steps, 2) that nobody simulated."""
-    error = np.asarray(error, dtype=float)
-    runs, steps, _ = error.shape
-    filler = np.zeros((runs, steps))
-    count = np.full(runs, steps)
-    return cooperative.Result(
-        error=error,
-        covariance=np.zeros((*error.shape, 2)) if covariance is None else covariance,
-        nis=filler,
-        weight=filler,
-        samples=count,
-        recoveries=count,
-        too_late=count,
-        status=np.zeros(runs, np.uint8),
-        scenario=Scenario(runs=runs, steps=steps),
-    )
-
-
 def test_the_figures_of_a_result_by_hand():
     """Mean squares of two runs: (0 + 2) / 2 = 1 and (36 + 62) / 2 = 49."""
     a = [[[0.0, 0.0], [1.0, -1.0]], [[0.0, 6.0], [math.sqrt(62), 0.0]]]
-    result = made_up(a)
+    result = cooperative_result(a)
     assert result.rmse_per_run_m == pytest.approx([1.0, 7.0])
     assert result.rmse_m == pytest.approx(5.0)  # of 25
     # The mean square has the standard error |1 - 49| / 2 = 24; d sqrt(m) = dm / (2 sqrt(m)).
     assert result.rmse_standard_error_m == pytest.approx(2.4)
-    assert math.isnan(made_up(a[:1]).rmse_standard_error_m)
+    assert math.isnan(cooperative_result(a[:1]).rmse_standard_error_m)
     # Rows after the end of a run do not count.
-    result = made_up([[[3.0, 4.0], [np.nan, np.nan]], [[0.0, 0.0], [0.0, 1.0]]])
+    result = cooperative_result([[[3.0, 4.0], [np.nan, np.nan]], [[0.0, 0.0], [0.0, 1.0]]])
     assert result.rmse_per_run_m == pytest.approx([5.0, math.sqrt(0.5)])
     assert result.rmse_m == pytest.approx(math.sqrt(26 / 3))
     # e' P^-1 e with P = diag(4, 9).
     spread = np.broadcast_to(np.diag([4.0, 9.0]), (1, 1, 2, 2))
-    assert made_up([[[2.0, 6.0]]], spread).nees == pytest.approx(1 + 4)
+    result = cooperative_result([[[2.0, 6.0]]], covariance=spread)
+    assert result.nees == pytest.approx(1 + 4)
 
 
 def test_factors_are_of_variances():
