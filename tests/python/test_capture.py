@@ -144,6 +144,25 @@ def test_requests() -> None:
     assert telemetry.answer(17, 1.5, -0.25) == telemetry.frame("SONAR,17,1.500000,-0.250000")
 
 
+def test_requests_of_the_odometer() -> None:
+    """What is asked of one instrument is not asked of the other."""
+    asked = telemetry.frame("ODO,3")
+    assert telemetry.requested_sample(asked, "ODO") == 3
+    assert telemetry.requested_sample(asked) is None
+    assert telemetry.requested_sample(telemetry.frame("PING,3"), "ODO") is None
+
+
+def test_an_answer_is_given_to_the_micrometre_and_microradian() -> None:
+    """Half of that more or less is rounded."""
+    body = telemetry.body_of(telemetry.answer(3, 12.3456784, -1.2345676))
+    assert body == "SONAR,3,12.345678,-1.234568"
+
+
+def test_a_checksum_has_two_digits() -> None:
+    assert telemetry.frame("AB") == "$AB*03"  # 0x41 xor 0x42
+    assert telemetry.body_of("$AB*03") == "AB"
+
+
 # ---- The simulated sonar -------------------------------------------------------------------------
 
 

@@ -45,6 +45,20 @@ def test_the_chunk_does_not_matter_either() -> None:
     assert montecarlo.run(task, 20, chunk=3)["series"].tobytes() == whole["series"].tobytes()
 
 
+@pytest.mark.parametrize(
+    ("runs", "rows", "workers", "chunk"),
+    [
+        (100, 60, 5, 5),  # four chunks for each worker
+        (101, 60, 5, 6),
+        (3, 60, 5, 1),
+        (10_000, 250_000, 5, 2),  # at most half a million rows in one
+        (10_000, 500_001, 5, 1),  # but a run is never parted
+    ],
+)
+def test_chunks_are_small_and_even(runs: int, rows: int, workers: int, chunk: int) -> None:
+    assert montecarlo.chunk_for(runs, rows, workers) == chunk
+
+
 def test_csv_keeps_all_digits(tmp_path: Path) -> None:
     columns = montecarlo.run(task, 9)
     columns["value"][4] = np.nan
