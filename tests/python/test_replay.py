@@ -339,6 +339,16 @@ def test_a_range_at_the_start_and_one_at_the_end_are_used(tmp_path: Path) -> Non
     )
 
 
+def test_when_it_was_taken_goes_before_from_where(tmp_path: Path) -> None:
+    """Nobody knows where source 8 is; before the start and after the end it does not matter."""
+    standing_log(tmp_path, start_s=1.5, ranges=[(2.0, 10.0)])
+    time_s = [1.0, 2.0, 10.0, 10.5]
+    write_file(tmp_path, "ranges.csv", time_s=time_s, source=[8] * 4, range_m=[10.0] * 4)
+    assert outcomes(run(tmp_path, settings_from(SURE), "ekf")) == [
+        "before start", "no position", "no position", "after end",
+    ]  # fmt: skip
+
+
 def test_a_held_out_range_says_how_much_too_long_the_prediction_was(tmp_path: Path) -> None:
     cases = [(1.0, 10.0), (2.0, 8.0), (3.0, 11.5), (6.0, 10.0)]
     standing_log(tmp_path, start_s=0.0, ranges=cases)
@@ -659,14 +669,14 @@ BELIEVING = {
 
 @pytest.mark.parametrize("filter_name", ["ekf", "ukf", "aukf"])
 def test_a_trackers_first_fix_by_hand(tmp_path: Path, filter_name: Any) -> None:
-    """3 m, 2 m/s for 2 s and 2 m/s^2 for 2 s: 9 + 16 + 16 m^2; with 8 of the range 49."""
-    far_fixes(tmp_path, [0j], [2.0], start_s=0.0)
+    """3 m, 1 m/s for 4 s and 0.5 m/s^2 for 4 s: 9 + 16 + 16 m^2; with 8 of the range 49."""
+    far_fixes(tmp_path, [0j], [4.0], start_s=0.0)
     settings = settings_from(
         {
             "start": {
                 "sigma_position_m": 3.0,
-                "sigma_speed_m_s": 2.0,
-                "sigma_acceleration_m_s2": 2.0,
+                "sigma_speed_m_s": 1.0,
+                "sigma_acceleration_m_s2": 0.5,
             },
             "fixes": {
                 "sigma_range_m": math.sqrt(8.0),
