@@ -150,6 +150,42 @@ def test_a_damaged_chunk_is_done_again(tmp_path: Path) -> None:
     assert not store.exists()
 
 
+def test_a_store_is_of_one_experiment_in_one_division(tmp_path: Path) -> None:
+    store = tmp_path / "store"
+    calls: list[int] = []
+
+    def counted(first: int, count: int) -> Columns:
+        calls.append(first)
+        return task(first, count)
+
+    def again(chunk: int, settings: dict[str, Any]) -> list[tuple[int, int]]:
+        calls.clear()
+        progress: list[tuple[int, int]] = []
+        montecarlo.run(
+            counted, 20, chunk=chunk, store=store, settings=settings,
+            progress=lambda *both: progress.append(both),
+        )  # fmt: skip
+        return progress
+
+    again(5, {"a": 1, "b": 2})
+    assert sorted(calls) == [0, 5, 10, 15]
+    # The order in which settings are named does not matter; what is kept counts as done.
+    assert again(5, {"b": 2, "a": 1}) == [(5, 20), (10, 20), (15, 20), (20, 20)]
+    assert calls == []
+    # Other chunks are another division: nothing of the first is left to be mistaken for it.
+    again(10, {"a": 1, "b": 2})
+    assert sorted(calls) == [0, 10]
+    assert sorted(path.name for path in store.iterdir()) == ["0-9.npz", "10-19.npz", "experiment"]
+
+
+def test_a_table_that_cannot_be_written_leaves_the_old_one(tmp_path: Path) -> None:
+    path = montecarlo.write_table(tmp_path / "t.csv", {"a": np.arange(2)})
+    before = path.read_bytes()
+    with pytest.raises(ValueError, match="shorter"):
+        montecarlo.write_table(path, {"a": np.arange(3), "b": np.arange(2)})
+    assert path.read_bytes() == before == b"a\n0\n1\n"
+
+
 def test_interrupt_keeps_what_is_done(tmp_path: Path) -> None:
     store = tmp_path / "store"
 
