@@ -112,6 +112,17 @@ def test_numbers_keep_their_bits() -> None:
     assert math.isnan(row["e"])  # what Arduino prints for more than 2^32
 
 
+@pytest.mark.parametrize(
+    "name",
+    ["sample", "time_s", "resamplings", "status", "missed", "refused", "late", "awake_us"],
+)
+def test_eight_digits_of_a_count_are_a_number_and_of_a_float_its_bits(name: str) -> None:
+    reader = Reader("SLAVE")
+    reader.read(f"# columns: {name},speed_m_s")
+    row = reader.read(telemetry.frame("SLAVE,40490000,40490000"))
+    assert row == {name: 40490000.0, "speed_m_s": 3.140625}  # 2 (1 + 0x490000 / 2^23)
+
+
 def test_samples_need_the_names_of_their_columns() -> None:
     reader = Reader()
     with pytest.raises(LineError, match="reset the board"):
@@ -134,6 +145,25 @@ def test_requests() -> None:
     for line in ("$PING,17*00", "$PING,", telemetry.frame("PING,x"), sample_line(1), "#"):
         assert telemetry.requested_sample(line) is None
     assert telemetry.answer(17, 1.5, -0.25) == telemetry.frame("SONAR,17,1.500000,-0.250000")
+
+
+def test_requests_of_the_odometer() -> None:
+    """What is asked of one instrument is not asked of the other."""
+    asked = telemetry.frame("ODO,3")
+    assert telemetry.requested_sample(asked, "ODO") == 3
+    assert telemetry.requested_sample(asked) is None
+    assert telemetry.requested_sample(telemetry.frame("PING,3"), "ODO") is None
+
+
+def test_an_answer_is_given_to_the_micrometre_and_microradian() -> None:
+    """Half of that more or less is rounded."""
+    body = telemetry.body_of(telemetry.answer(3, 12.3456784, -1.2345676))
+    assert body == "SONAR,3,12.345678,-1.234568"
+
+
+def test_a_checksum_has_two_digits() -> None:
+    assert telemetry.frame("AB") == "$AB*03"  # 0x41 xor 0x42
+    assert telemetry.body_of("$AB*03") == "AB"
 
 
 # ---- The simulated sonar -------------------------------------------------------------------------

@@ -45,6 +45,20 @@ def test_the_chunk_does_not_matter_either() -> None:
     assert montecarlo.run(task, 20, chunk=3)["series"].tobytes() == whole["series"].tobytes()
 
 
+@pytest.mark.parametrize(
+    ("runs", "rows", "workers", "chunk"),
+    [
+        (100, 60, 5, 5),  # four chunks for each worker
+        (101, 60, 5, 6),
+        (3, 60, 5, 1),
+        (10_000, 250_000, 5, 2),  # at most half a million rows in one
+        (10_000, 500_001, 5, 1),  # but a run is never parted
+    ],
+)
+def test_chunks_are_small_and_even(runs: int, rows: int, workers: int, chunk: int) -> None:
+    assert montecarlo.chunk_for(runs, rows, workers) == chunk
+
+
 def test_csv_keeps_all_digits(tmp_path: Path) -> None:
     columns = montecarlo.run(task, 9)
     columns["value"][4] = np.nan
@@ -137,6 +151,42 @@ def test_a_damaged_chunk_is_done_again(tmp_path: Path) -> None:
     assert sorted(calls) == [0, 5, 10, 15]
     montecarlo.discard(store)
     assert not store.exists()
+
+
+def test_a_store_is_of_one_experiment_in_one_division(tmp_path: Path) -> None:
+    store = tmp_path / "store"
+    calls: list[int] = []
+
+    def counted(first: int, count: int) -> Columns:
+        calls.append(first)
+        return task(first, count)
+
+    def again(chunk: int, settings: dict[str, Any]) -> list[tuple[int, int]]:
+        calls.clear()
+        progress: list[tuple[int, int]] = []
+        montecarlo.run(
+            counted, 20, chunk=chunk, store=store, settings=settings,
+            progress=lambda *both: progress.append(both),
+        )  # fmt: skip
+        return progress
+
+    again(5, {"a": 1, "b": 2})
+    assert sorted(calls) == [0, 5, 10, 15]
+    # The order in which settings are named does not matter; what is kept counts as done.
+    assert again(5, {"b": 2, "a": 1}) == [(5, 20), (10, 20), (15, 20), (20, 20)]
+    assert calls == []
+    # Other chunks are another division: nothing of the first is left to be mistaken for it.
+    again(10, {"a": 1, "b": 2})
+    assert sorted(calls) == [0, 10]
+    assert sorted(path.name for path in store.iterdir()) == ["0-9.npz", "10-19.npz", "experiment"]
+
+
+def test_a_table_that_cannot_be_written_leaves_the_old_one(tmp_path: Path) -> None:
+    path = montecarlo.write_table(tmp_path / "t.csv", {"a": np.arange(2)})
+    before = path.read_bytes()
+    with pytest.raises(ValueError, match="shorter"):
+        montecarlo.write_table(path, {"a": np.arange(3), "b": np.arange(2)})
+    assert path.read_bytes() == before == b"a\n0\n1\n"
 
 
 def test_interrupt_keeps_what_is_done(tmp_path: Path) -> None:

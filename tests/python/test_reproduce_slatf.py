@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from processes import PATIENCE_S, start_program, wait_until
+from result_support import slat_result
 from typer.testing import CliRunner, Result
 
 from auvest.cli import app
@@ -192,6 +193,27 @@ def test_workers_and_progress(small: slatf.Reproduction) -> None:
     )
     assert calls[-1][0] == calls[-1][1]
     assert [done for done, _ in calls] == sorted(done for done, _ in calls)
+
+
+def test_the_figures_of_a_result_by_hand() -> None:
+    """Distances of 5 and 1 m in one run, 7 and 7 m in the other."""
+    result = slat_result([[[3, -4], [0, 1]], [[7, 0], [0, -7]]])
+    roots = (math.sqrt(13), 7.0)
+    rmse = slatf.rmse(result)
+    assert rmse.value == pytest.approx(sum(roots) / 2)
+    assert rmse.standard_error == pytest.approx((7 - math.sqrt(13)) / 2)  # |a - b| / 2 of two
+    assert slatf.mean_error(result) == 5.0
+    assert slatf.error_variance(result) == 6.0  # (0 + 16 + 4 + 4) / 4
+    assert slatf.rms_per_ping(result) == pytest.approx([math.sqrt(37), 5.0])
+
+
+def test_a_difference_is_that_of_paired_runs() -> None:
+    """Of 5 and 8 m against 4 and 5 m: 1 and 3 m, 2 m with a standard error of 1 m."""
+    a, b = slat_result([[[3, 4]], [[0, 8]]]), slat_result([[[4, 0]], [[0, 5]]])
+    assert slatf.difference(a, b) == slatf.Estimate(pytest.approx(2.0), pytest.approx(1.0))
+    one = slatf.difference(slat_result([[[3, 4]]]), slat_result([[[0, 1]]]))
+    assert one.value == pytest.approx(4.0)
+    assert math.isnan(one.standard_error)
 
 
 def test_one_run_is_enough_for_a_page(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from result_support import cooperative_result
 
 import auvest
 from auvest.scenarios import cooperative
@@ -137,6 +138,35 @@ def test_float32_runs_too():
     result = simulate(slave_filter(dtype="float32"), Scenario(**SHORT))
     wanted = simulate(slave_filter(), Scenario(**SHORT))
     assert result.rmse_m == pytest.approx(wanted.rmse_m, rel=1e-2)
+
+
+def test_the_figures_of_a_result_by_hand():
+    """Mean squares of two runs: (0 + 2) / 2 = 1 and (36 + 62) / 2 = 49."""
+    a = [[[0.0, 0.0], [1.0, -1.0]], [[0.0, 6.0], [math.sqrt(62), 0.0]]]
+    result = cooperative_result(a)
+    assert result.rmse_per_run_m == pytest.approx([1.0, 7.0])
+    assert result.rmse_m == pytest.approx(5.0)  # of 25
+    # The mean square has the standard error |1 - 49| / 2 = 24; d sqrt(m) = dm / (2 sqrt(m)).
+    assert result.rmse_standard_error_m == pytest.approx(2.4)
+    assert math.isnan(cooperative_result(a[:1]).rmse_standard_error_m)
+    # Rows after the end of a run do not count.
+    result = cooperative_result([[[3.0, 4.0], [np.nan, np.nan]], [[0.0, 0.0], [0.0, 1.0]]])
+    assert result.rmse_per_run_m == pytest.approx([5.0, math.sqrt(0.5)])
+    assert result.rmse_m == pytest.approx(math.sqrt(26 / 3))
+    # e' P^-1 e with P = diag(4, 9).
+    spread = np.broadcast_to(np.diag([4.0, 9.0]), (1, 1, 2, 2))
+    result = cooperative_result([[[2.0, 6.0]]], covariance=spread)
+    assert result.nees == pytest.approx(1 + 4)
+
+
+def test_factors_are_of_variances():
+    plain = slave_filter()
+    wide = slave_filter(q_factor=4.0, r_factor=9.0)
+    assert plain.measurement.sigma_range_m == 1.0
+    assert wide.measurement.sigma_range_m == 3.0
+    assert slave_filter(r_factor=0.25, sigma_range_m=3.0).measurement.sigma_range_m == 1.5
+    for name in ("sigma_forward", "sigma_heading"):
+        assert getattr(wide.process, name) == 2 * getattr(plain.process, name) > 0
 
 
 def test_what_a_simulation_cannot_take_is_refused():
