@@ -7,9 +7,10 @@ All filters do the same work: poses of three states drawn from noisy speed and y
 of six states (Euler, Q = dt diag(q)), range and bearing from the heading, systematic resampling
 below N_eff = N / 2, the four mean positions recorded at every step; 200 steps of 0.5 s. They draw
 their own random numbers and must agree in accuracy. Numba runs in float32 and in double, which is
-what it is written in where nobody asks for less; the bounds are for double. The times are the
+what it is written in where nobody asks for less; the targets are for double. The times are the
 processor's, taken in turn, round by round, so that their ratios hold when the machine's speed
-drifts; only the ratios travel to another machine. Exit code 1 if a bound is missed.
+drifts; only the ratios travel to another machine, and not exactly (checks.py). Exit code 1 if a
+bound is missed.
 """
 
 from __future__ import annotations
@@ -25,6 +26,8 @@ from pathlib import Path
 
 import numba
 import numpy as np
+from checks import MARGIN, Check, judge
+from checks import table as ratio_table
 from rich.console import Console
 from rich.progress import track as progress
 
@@ -42,10 +45,10 @@ NOT_ON_THIS_PROCESSOR = 77
 
 PASSES = 3  # at least, of which the fastest counts
 
-MIN_NUMBA = {100: 10.0, 10_000: 14.0}
-MIN_NUMPY = 60.0  # at 100 particles
-MAX_VERSION_2 = 2.0
-MAX_GROWTH = 1.3  # per particle, from 1,000 to 100,000 particles
+TARGET_NUMBA = {100: 10.0, 10_000: 14.0}  # in double
+TARGET_NUMPY = 60.0  # at 100 particles
+TARGET_VERSION_2 = 2.0
+TARGET_GROWTH = 1.3  # per particle, from 1,000 to 100,000 particles
 
 PAGE = """# Speed of SLATF
 
@@ -55,17 +58,17 @@ master of six states, range and bearing, systematic resampling below N_eff = N /
 the processor's, medians of rounds in which all take their turn over the same records; only the
 ratios travel to another machine. The rows of auvest are one program per instruction set
 (cpp/benchmarks/slat_step.cpp, chosen when it is compiled), built with the library's flags; NumPy
-and Numba take the best that the processor has. The bounds on Numba are for double, what it
+and Numba take the best that the processor has. The targets on Numba are for double, what it
 computes in where nobody asks for less.
 
 Nanoseconds per particle and sonar step:
 
 {times}
 
-Ratios, of the times of the same round:
+Ratios, of the times of the same round. The targets are for the machine that these numbers are
+from; `make bench` fails {margin} beyond them, because other processors, BLAS libraries and
+compilers of Numba shift a ratio by up to 17 % (seen).
 
-| ratio | median | bound |
-| --- | ---: | ---: |
 {ratios}
 
 RMSE over {runs} runs with N = 100, of the master's and the slave's position (m): {errors}.
@@ -402,51 +405,50 @@ def main() -> int:
         return float(np.median(np.array(times[above]) / np.array(times[below])))
 
     first, second = (f"auvest SLATF {version}.0, {names[-1]}" for version in (1, 2))
-    checks: list[tuple[str, float, str, float | None]] = [
-        (
+    checks = [
+        Check(
             f"Numba, {kind} / SLATF 1.0, N = {n:,}",
             ratio((f"Numba, {kind}", n), (first, n)),
-            ">=",
-            bound if kind == "double" else None,
+            target=target if kind == "double" else None,
         )
         for kind in ("double", "float32")
-        for n, bound in MIN_NUMBA.items()
+        for n, target in TARGET_NUMBA.items()
     ]
     checks.append(
-        ("NumPy / SLATF 1.0, N = 100", ratio(("NumPy", 100), (first, 100)), ">=", MIN_NUMPY)
+        Check(
+            "NumPy / SLATF 1.0, N = 100",
+            ratio(("NumPy", 100), (first, 100)),
+            target=TARGET_NUMPY,
+        )
     )
     checks += [
-        (f"SLATF 2.0 / 1.0, N = {n:,}", ratio((second, n), (first, n)), "<=", MAX_VERSION_2)
+        Check(
+            f"SLATF 2.0 / 1.0, N = {n:,}",
+            ratio((second, n), (first, n)),
+            "<=",
+            target=TARGET_VERSION_2,
+        )
         for n in (100, 1000)
     ]
     checks.append(
-        (
+        Check(
             "SLATF 1.0 per particle, N = 100,000 / 1,000",
             ratio((first, 100_000), (first, 1000)),
             "<=",
-            MAX_GROWTH,
+            target=TARGET_GROWTH,
         )
     )
-    passed = [
-        b is None or (value >= b if sign == ">=" else value <= b) for _, value, sign, b in checks
-    ]
-    bounds = ["" if b is None else f"{sign} {b:g}" for _, _, sign, b in checks]
-    ratios = [
-        f"| {name} | {value:.3g} | {bound}{'' if good else ', missed'} |"
-        for (name, value, _, _), bound, good in zip(checks, bounds, passed, strict=True)
-    ]
     text = PAGE.format(
         times=table(times),
-        ratios="\n".join(ratios),
+        ratios=ratio_table(checks),
+        margin=f"{MARGIN:.0%}".replace("%", " %"),
         runs=RUNS,
         errors="; ".join(f"{name} {m:.2f}, {s:.2f}" for name, (m, s) in errors.items()),
     )
     print(text)
     if arguments.write:
         arguments.write.write_text(text)
-    for (name, value, _, _), bound, good in zip(checks, bounds, passed, strict=True):
-        print(f"{'ok    ' if good else 'MISSED'} {name}: {value:.3g} {bound}", file=sys.stderr)
-    return 0 if all(passed) else 1
+    return judge(checks)
 
 
 if __name__ == "__main__":

@@ -80,7 +80,8 @@ py::dict cooperate_many(const FilterHandle<Scalar>& handle,
   py::array_t<double> error(std::vector<py::ssize_t>{runs, steps, 2});
   py::array_t<double> covariance(std::vector<py::ssize_t>{runs, steps, 2, 2});
   py::array_t<double> nis(flat), weight(flat);
-  py::array_t<std::int64_t> samples(runs), recoveries(runs), too_late(runs);
+  py::array_t<std::int64_t> samples(runs), recoveries(runs);
+  py::array_t<std::int64_t> taken(runs), too_late(runs), lost(runs), overflowed(runs);
   py::array_t<std::uint8_t> status(runs);
   for (auto* array : {&error, &covariance, &nis, &weight}) {
     std::fill_n(array->mutable_data(), array->size(), std::nan(""));
@@ -91,7 +92,10 @@ py::dict cooperate_many(const FilterHandle<Scalar>& handle,
   double* weight_out = weight.mutable_data();
   std::int64_t* samples_out = samples.mutable_data();
   std::int64_t* recoveries_out = recoveries.mutable_data();
+  std::int64_t* taken_out = taken.mutable_data();
   std::int64_t* too_late_out = too_late.mutable_data();
+  std::int64_t* lost_out = lost.mutable_data();
+  std::int64_t* overflowed_out = overflowed.mutable_data();
   std::uint8_t* status_out = status.mutable_data();
   {
     py::gil_scoped_release release;
@@ -113,7 +117,7 @@ py::dict cooperate_many(const FilterHandle<Scalar>& handle,
       }
       py::ssize_t row = run * steps;
       std::int64_t recovered = 0;
-      std::int64_t late = 0;
+      MessageCounts sum;
       Status result = filter.reset(start, prototype.P());
       if (result == Status::kOk) {
         result = cooperate(filter, sensor, scenario, random, static_cast<std::uint32_t>(steps),
@@ -131,13 +135,19 @@ py::dict cooperate_many(const FilterHandle<Scalar>& handle,
                                weight_out[row] = static_cast<double>(step.correction->weight(0));
                                recovered += step.correction->recovered ? 1 : 0;
                              }
-                             late += step.too_late ? 1 : 0;
+                             sum.taken += step.messages.taken;
+                             sum.too_late += step.messages.too_late;
+                             sum.lost += step.messages.lost;
+                             sum.overflowed += step.messages.overflowed;
                              ++row;
                            });
       }
       samples_out[run] = row - run * steps;
       recoveries_out[run] = recovered;
-      too_late_out[run] = late;
+      taken_out[run] = sum.taken;
+      too_late_out[run] = sum.too_late;
+      lost_out[run] = sum.lost;
+      overflowed_out[run] = sum.overflowed;
       status_out[run] = static_cast<std::uint8_t>(result);
     }
   }
@@ -148,7 +158,10 @@ py::dict cooperate_many(const FilterHandle<Scalar>& handle,
   result["weight"] = weight;
   result["samples"] = samples;
   result["recoveries"] = recoveries;
+  result["taken"] = taken;
   result["too_late"] = too_late;
+  result["lost"] = lost;
+  result["overflowed"] = overflowed;
   result["status"] = status;
   return result;
 }
@@ -173,6 +186,7 @@ void bind_cooperative(py::module_& m) {
     result["sigma_speed"] = s.sigma_speed;
     result["sigma_heading"] = s.sigma_heading;
     result["late_steps"] = s.late_steps;
+    result["messages_in_flight"] = kMessagesInFlight + 0;
     result["most_late_steps"] = CooperativeScenario::kMostLateSteps + 0;
     return result;
   });

@@ -2,9 +2,11 @@
 //
 // Single steps are fast: arguments in their usual forms are read here, and whatever is not in such
 // a form is answered with kUnclear, upon which the Python layer looks closer, converts or explains.
+#include <dlfcn.h>
+
 #include <cmath>
 
-#include "desk/catalogue.hpp"
+#include "desk/function_models.hpp"
 #include "handles.hpp"
 
 namespace auvest {
@@ -351,6 +353,31 @@ py::object law(const FilterHandle<Scalar>& handle) {
   return result;
 }
 
+/// Everything that can be made by name: the registry's models, and those of libraries loaded since.
+template <class Scalar>
+desk::Catalogue<Scalar>& catalogue() {
+  static auto* const all = [] {  // never destroyed: it lives as long as the process
+    auto* made = new desk::Catalogue<Scalar>();
+    desk::add_models<2>(*made);
+    desk::add_models<3>(*made);
+    desk::add_models<4>(*made);
+    desk::add_models<6>(*made);
+    if constexpr (std::is_same<Scalar, double>::value) desk::add_function_filters(*made);
+    return made;
+  }();
+  return *all;
+}
+
+/// Adds the models of a compiled library to the catalogues. The library stays.
+void load_library(const std::string& path) {
+  void* const library = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
+  if (library == nullptr) throw py::import_error(dlerror());
+  void* const symbol = dlsym(library, "auvest_add_models");
+  if (symbol == nullptr) throw py::import_error(path + " is no library of models");
+  using AddModels = void(desk::Catalogue<float>&, desk::Catalogue<double>&);
+  reinterpret_cast<AddModels*>(symbol)(catalogue<float>(), catalogue<double>());
+}
+
 template <class Scalar>
 void bind_precision(py::module_& m) {
   using Filter = FilterHandle<Scalar>;
@@ -413,7 +440,8 @@ void bind_precision(py::module_& m) {
       .def(py::init([](const std::shared_ptr<Process>& process, const AnyKernel<Scalar>& kernel,
                        const AnyInterval<Scalar>& policy, const py::dict& options) {
              Filter made;
-             made.filter = process->filter(process, to_options(options, kernel, policy));
+             const auto make = catalogue<Scalar>().filters.at(process->states);
+             made.filter = make(process, to_options(options, kernel, policy));
              if (made.filter == nullptr) throw StatusError(Status::kBadParameter);
              return made;
            }),
@@ -476,15 +504,10 @@ void bind_precision(py::module_& m) {
         return p;
       });
 
-  auto* catalogue = new desk::Catalogue<Scalar>();  // lives as long as the module
-  desk::add_models<2>(*catalogue);
-  desk::add_models<3>(*catalogue);
-  desk::add_models<4>(*catalogue);
-  desk::add_models<6>(*catalogue);
   m.def(
       named<Scalar>("make_process").c_str(),
-      [catalogue](const std::string& name, const Array<Scalar>& values) {
-        const auto& entry = catalogue->processes.at(name);
+      [](const std::string& name, const Array<Scalar>& values) {
+        const auto& entry = catalogue<Scalar>().processes.at(name);
         require_shape(values, {py::ssize_t(entry.parameters.names.size())}, "values");
         const auto process = entry.make(values.data());
         if (process == nullptr) throw StatusError(Status::kBadParameter);
@@ -493,8 +516,8 @@ void bind_precision(py::module_& m) {
       py::arg("name"), py::arg("values").noconvert());
   m.def(
       named<Scalar>("make_sensor").c_str(),
-      [catalogue](const std::string& name, int states, const Array<Scalar>& values) {
-        const auto& entry = catalogue->sensors.at({name, states});
+      [](const std::string& name, int states, const Array<Scalar>& values) {
+        const auto& entry = catalogue<Scalar>().sensors.at({name, states});
         require_shape(values, {py::ssize_t(entry.parameters.names.size())}, "values");
         const auto sensor = entry.make(values.data());
         if (sensor == nullptr) throw StatusError(Status::kBadParameter);
@@ -512,14 +535,14 @@ void bind_precision(py::module_& m) {
   };
   m.def(
       "process_defaults",
-      [catalogue, defaults](const std::string& name) {
-        return defaults(catalogue->processes.at(name).parameters);
+      [defaults](const std::string& name) {
+        return defaults(catalogue<Scalar>().processes.at(name).parameters);
       },
       py::arg("name"), "The parameters of a process by name, in the order of make_process.");
   m.def(
       "sensor_defaults",
-      [catalogue, defaults](const std::string& name) {
-        for (const auto& entry : catalogue->sensors) {
+      [defaults](const std::string& name) {
+        for (const auto& entry : catalogue<Scalar>().sensors) {
           if (entry.first.first == name) return defaults(entry.second.parameters);
         }
         throw py::key_error(name);
@@ -527,9 +550,9 @@ void bind_precision(py::module_& m) {
       py::arg("name"), "The parameters of a sensor by name, in the order of make_sensor.");
   m.def(
       "sensor_states",
-      [catalogue](const std::string& name) {
+      [](const std::string& name) {
         py::list states;
-        for (const auto& entry : catalogue->sensors) {
+        for (const auto& entry : catalogue<Scalar>().sensors) {
           if (entry.first.first == name) states.append(entry.first.second);
         }
         return states;
@@ -537,10 +560,10 @@ void bind_precision(py::module_& m) {
       py::arg("name"), "Numbers of states that a sensor is made for.");
   m.def(
       "models",
-      [catalogue] {
+      [] {
         py::list processes, sensors;
-        for (const auto& entry : catalogue->processes) processes.append(entry.first);
-        for (const auto& entry : catalogue->sensors) {
+        for (const auto& entry : catalogue<Scalar>().processes) processes.append(entry.first);
+        for (const auto& entry : catalogue<Scalar>().sensors) {
           sensors.append(py::make_tuple(entry.first.first, entry.first.second));
         }
         return py::make_tuple(processes, sensors);
@@ -555,6 +578,7 @@ void bind_filters(py::module_& m) {
   m.attr("MAX_PLACE") = kMaxPlace;
   bind_precision<float>(m);
   bind_precision<double>(m);
+  m.def("load_library", &load_library, py::arg("path"));
   m.def("sigma_points_defaults", [] { return to_dict(SigmaPoints<double>::Params()); });
 }
 

@@ -1,5 +1,7 @@
 // Models written in Python. What a function raises goes to `keep`, and NaN to the core, which refuses
 // the step; the Python layer then raises what the function raised.
+#include <pybind11/stl.h>
+
 #include "desk/function_models.hpp"
 #include "handles.hpp"
 

@@ -1,8 +1,6 @@
 // Filters and sensors for models that are functions, compiled for every size that they may have.
 #include "desk/function_models.hpp"
 
-#include "desk/filter.hpp"
-
 namespace auvest {
 namespace desk {
 namespace {
@@ -33,6 +31,14 @@ std::shared_ptr<AnySensor<double>> make_sensor(int states, int size,
 }
 
 }  // namespace
+
+void add_function_filters(Catalogue<double>& catalogue) {
+  add_filters<1>(catalogue);
+  add_filters<5>(catalogue);
+  add_filters<7>(catalogue);
+  add_filters<8>(catalogue);
+  add_filters<9>(catalogue);
+}
 
 std::shared_ptr<const AnyProcess<double>> function_process(int states,
                                                            const ProcessFunctions& functions) {

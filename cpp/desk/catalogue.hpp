@@ -32,6 +32,8 @@ struct Catalogue {
   std::map<std::string, Entry<Scalar, const AnyProcess<Scalar>>> processes;
   /// By name and number of states.
   std::map<std::pair<std::string, int>, Entry<Scalar, AnySensor<Scalar>>> sensors;
+  /// By number of states.
+  std::map<int, decltype(&make_filter<Scalar, 2>)> filters;
 };
 
 template <class Params>
@@ -76,19 +78,26 @@ void add_sensor(Catalogue<Scalar>& catalogue, const char* name) {
   };
 }
 
-/// The models of the registry for N states: states_<N>.cpp.
+/// The filters of N states; they are compiled once, whatever the process.
+template <int N, class Scalar>
+void add_filters(Catalogue<Scalar>& catalogue) {
+  catalogue.filters[N] = &make_filter<Scalar, N>;
+}
+
+/// The filters and the models of the registry for N states: states_<N>.cpp.
 template <int N, class Scalar>
 void add_models(Catalogue<Scalar>& catalogue);
 
 #define AUVEST_ADD_PROCESS(name, ...) \
   if constexpr (__VA_ARGS__::kStates == N) add_process<__VA_ARGS__>(catalogue, name);
-#define AUVEST_ADD_SENSOR(name, Model, suits) \
-  if constexpr (suits) add_sensor<Model<Scalar, N>>(catalogue, name);
+#define AUVEST_ADD_SENSOR(name, suits, ...) \
+  if constexpr (suits) add_sensor<__VA_ARGS__>(catalogue, name);
 
 /// Defines add_models for n states in both precisions. Needs auvest/registry.hpp.
 #define AUVEST_DEFINE_MODELS(n)                          \
   template <int N, class Scalar>                         \
   void add_models(Catalogue<Scalar>& catalogue) {        \
+    add_filters<N>(catalogue);                           \
     AUVEST_PROCESSES(AUVEST_ADD_PROCESS)                 \
     AUVEST_SENSORS(AUVEST_ADD_SENSOR)                    \
   }                                                      \

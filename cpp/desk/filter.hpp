@@ -424,11 +424,13 @@ class FilterFor final : public AnyFilter<Scalar> {
   Memory memory_;
 };
 
+/// A filter of this process of N states; needs reset() next. Null where the options are out of
+/// range.
 template <class Scalar, int N>
-std::unique_ptr<AnyFilter<Scalar>> ProcessFor<Scalar, N>::filter(
-    const std::shared_ptr<const AnyProcess<Scalar>>& self,
-    const FilterOptions<Scalar>& options) const {
-  const auto own = std::static_pointer_cast<const ProcessFor>(self);
+std::unique_ptr<AnyFilter<Scalar>> make_filter(
+    const std::shared_ptr<const AnyProcess<Scalar>>& process,
+    const FilterOptions<Scalar>& options) {
+  const auto own = std::static_pointer_cast<const ProcessFor<Scalar, N>>(process);
   std::unique_ptr<FilterFor<Scalar, N>> made(new FilterFor<Scalar, N>(own, options));
   if (made->filter().check() != Status::kOk) return nullptr;
   return std::unique_ptr<AnyFilter<Scalar>>(made.release());

@@ -16,7 +16,7 @@
 #include "auvest/math/angle.hpp"
 #include "auvest/models/measurement_model.hpp"
 #include "auvest/models/process_model.hpp"
-#include "desk/models.hpp"
+#include "desk/catalogue.hpp"
 
 namespace auvest {
 namespace desk {
@@ -157,6 +157,9 @@ struct FunctionSensor : MeasurementModel<FunctionSensor<N, M>, double, N, M> {
     return difference;
   }
 };
+
+/// The filters of the numbers of states that no model of the registry has.
+void add_function_filters(Catalogue<double>& catalogue);
 
 /// Null where there is no filter of so many states, or no sensor of so many numbers.
 std::shared_ptr<const AnyProcess<double>> function_process(int states,

@@ -18,11 +18,6 @@
 namespace auvest {
 namespace desk {
 
-template <class Scalar>
-class AnyFilter;
-template <class Scalar>
-struct FilterOptions;
-
 /// A process model, whatever its number of states.
 template <class Scalar>
 struct AnyProcess {
@@ -36,10 +31,6 @@ struct AnyProcess {
   virtual void f(const Scalar* x, Scalar dt, const Scalar* input, Scalar* out) const = 0;
   virtual void Phi(const Scalar* x, Scalar dt, const Scalar* input, Scalar* out) const = 0;
   virtual void Q(Scalar dt, const Scalar* input, Scalar* out) const = 0;
-
-  /// A filter of this process; needs reset() next. Null where the options are out of range.
-  virtual std::unique_ptr<AnyFilter<Scalar>> filter(const std::shared_ptr<const AnyProcess>& self,
-                                                    const FilterOptions<Scalar>& options) const = 0;
 };
 
 /// A measurement model, whatever the number of states it is for.
@@ -47,7 +38,7 @@ template <class Scalar>
 struct AnySensor {
   const int states;
   const int size;
-  const int place;          ///< coordinates that say where it stands; 0: it has no place
+  const int place;          ///< numbers that say where it stood or how it was headed; 0: none
   std::string description;  ///< how its owner would make it again
 
   AnySensor(int n, int m, int p) : states(n), size(m), place(p) {}
@@ -61,8 +52,6 @@ struct ProcessFor : AnyProcess<Scalar> {
   using Input = Vector<Scalar, kMaxInputs>;
 
   explicit ProcessFor(int u) : AnyProcess<Scalar>(N, u) {}
-  std::unique_ptr<AnyFilter<Scalar>> filter(const std::shared_ptr<const AnyProcess<Scalar>>& self,
-                                            const FilterOptions<Scalar>& options) const override;
 
   virtual Status predict(const AnyLinearisation<Scalar>& how, Belief<Scalar, N>& belief, Scalar dt,
                          const Input& input) const = 0;

@@ -103,17 +103,29 @@ struct CooperativeScenario {
   static constexpr std::uint32_t kMostLateSteps = 20;
 };
 
+/// What became of messages with a range; each is counted once, at the step where it is decided.
+/// Those that are still on their way at the end of a run are in none of the numbers.
+struct MessageCounts {
+  std::uint32_t taken = 0;       ///< corrected the filter
+  std::uint32_t too_late = 0;    ///< older than the filter's memory
+  std::uint32_t lost = 0;        ///< in the water: `dropout`
+  std::uint32_t overflowed = 0;  ///< kMessagesInFlight others were on their way
+};
+
 /// One step of the slave's instruments.
 template <class Filter, class Report>
 struct CooperativeStep {
   const CooperativeFleet& fleet;
   const Filter& filter;
-  const Report* correction;  ///< of the range that was taken, or null
-  bool too_late;             ///< a range was older than the filter's memory
+  const Report* correction;  ///< of the last range that was taken in this step, or null
+  MessageCounts messages;    ///< of this step
 };
 
 /// Events that the filter remembers: two cycles of messages and the longest delay.
 const int kCooperativeMemory = 64;
+
+/// Messages that can be on their way at once.
+const int kMessagesInFlight = 8;
 
 /// A range on its way to the slave.
 struct RangeMessage {
@@ -127,7 +139,8 @@ struct RangeMessage {
 
 /// Runs `steps` steps of dead reckoning with the ranges among them, and hands every step to
 /// `sink(step)`. `sensor` brings the noise the filter is told; its leader is set here. Stops at the
-/// first status that is not kOk and returns it; a range that is too old is no such failure.
+/// first status that is not kOk and returns it; a range that is too old is no such failure, nor is
+/// a message lost or one too many: they are counted.
 ///
 /// A leader's message carries its position now and the range of its previous exchange: a range is
 /// complete one cycle of its leader after it was measured.
@@ -142,8 +155,7 @@ inline Status cooperate(Filter& filter,
   using Report = typename Late::Report;
   CooperativeFleet& fleet = scenario.fleet;
   const std::uint32_t cycle = 2 * scenario.range_every;
-  const int kMessages = 8;
-  RangeMessage messages[kMessages];
+  RangeMessage messages[kMessagesInFlight];
   Late late(filter);
   for (std::uint32_t k = 1; k <= steps; ++k) {
     double speed_error = 0;
@@ -160,6 +172,7 @@ inline Status cooperate(Filter& filter,
     const Status status = late.predict(static_cast<Scalar>(scenario.dt_s), input);
     if (status != Status::kOk) return status;
 
+    MessageCounts counts;
     if (k % scenario.range_every == 0) {
       RangeMessage message;
       message.leader = static_cast<int>(k / scenario.range_every % 2);
@@ -169,21 +182,23 @@ inline Status cooperate(Filter& filter,
       const double dy = fleet.position[1] - message.there[1];
       message.range = math::sqrt(dx * dx + dy * dy) + scenario.noise.draw(random);
       message.arrives = scenario.timing == RangeTiming::kAtOnce ? k : k + cycle;
-      message.pending = !(scenario.dropout > 0 && random.uniform<double>() < scenario.dropout);
+      const bool lost = scenario.dropout > 0 && random.uniform<double>() < scenario.dropout;
       if (scenario.late > 0 && random.uniform<double>() < scenario.late) {
         message.arrives +=
             1 + static_cast<std::uint32_t>(random.uniform<double>() * scenario.late_steps);
       }
+      message.pending = true;
+      bool homeless = !lost;
       for (RangeMessage& slot : messages) {
-        if (slot.pending) continue;
+        if (!homeless || slot.pending) continue;
         slot = message;
-        break;
+        homeless = false;
       }
+      counts.lost = lost ? 1 : 0;
+      counts.overflowed = homeless ? 1 : 0;
     }
 
     Report correction(Status::kOk);
-    bool taken = false;
-    bool too_late = false;
     for (RangeMessage& message : messages) {
       if (!message.pending || message.arrives != k) continue;
       message.pending = false;
@@ -196,14 +211,18 @@ inline Status cooperate(Filter& filter,
       sensor.params.leader_y_m = static_cast<Scalar>(message.there[1]);
       Vector<Scalar, 1> z;
       z(0) = static_cast<Scalar>(message.range);
-      correction = late.update(z, sensor, age);
-      too_late = too_late || correction.status == Status::kTimeBackwards;
-      if (correction.status == Status::kTimeBackwards) continue;
-      if (correction.status != Status::kOk) return correction.status;
-      taken = true;
+      const Report report = late.update(z, sensor, age);
+      if (report.status == Status::kTimeBackwards) {
+        ++counts.too_late;
+        continue;
+      }
+      if (report.status != Status::kOk) return report.status;
+      correction = report;
+      ++counts.taken;
     }
     filter = late.filter();
-    sink(CooperativeStep<Filter, Report>{fleet, filter, taken ? &correction : nullptr, too_late});
+    sink(CooperativeStep<Filter, Report>{fleet, filter, counts.taken > 0 ? &correction : nullptr,
+                                         counts});
   }
   return Status::kOk;
 }

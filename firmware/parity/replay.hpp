@@ -12,12 +12,12 @@
 // of kind kRobust goes on as replay_robust.hpp says.
 #pragma once
 
-#include "auvest/runtime/any_interval.hpp"
 #include "auvest/filters/adaptive_interval.hpp"
 #include "auvest/filters/ekf.hpp"
 #include "auvest/filters/ukf.hpp"
 #include "auvest/models/constant_acceleration.hpp"
 #include "auvest/models/range_bearing.hpp"
+#include "auvest/runtime/any_interval.hpp"
 #include "auvest/self_test.hpp"
 #include "replay_robust.hpp"
 

@@ -1,7 +1,8 @@
-// The replay of a robust EKF: speed and heading or odometry, ranges to leaders. As replay.hpp, with
-// records of its own kind:
+// The replay of a robust EKF, UKF or CKF: speed and heading or odometry, ranges to leaders. As
+// replay.hpp, with records of its own kind:
 //
-//     record: process, steps, kernel, its three thresholds, post-fit?, rejections (0: no recovery),
+//     record: process + 256 times filter, steps, kernel, its three thresholds, post-fit?,
+//     rejections (0: no recovery),
 //             process parameters, sensor (leader left out), x0, P0,
 //             then per step: flags, dt, input, z, leader
 //     trace:  status of reset, then per step: x, P, innovation, S, nis, standardised, weight,
@@ -9,13 +10,15 @@
 //             and statuses
 #pragma once
 
-#include "auvest/runtime/any_kernel.hpp"
-#include "auvest/runtime/any_recovery.hpp"
+#include "auvest/filters/ckf.hpp"
 #include "auvest/filters/ekf.hpp"
 #include "auvest/filters/robust.hpp"
+#include "auvest/filters/ukf.hpp"
 #include "auvest/models/leader_range.hpp"
 #include "auvest/models/odometry.hpp"
 #include "auvest/models/speed_heading.hpp"
+#include "auvest/runtime/any_kernel.hpp"
+#include "auvest/runtime/any_recovery.hpp"
 
 namespace auvest {
 namespace parity {
@@ -27,12 +30,24 @@ class RobustReplay {
 
   void run() {
     enum Kind : std::uint32_t { kSpeedHeading, kSpeedHeadingBiasScale, kOdometry };
-    const std::uint32_t process = stream_.read();
+    enum Filter : std::uint32_t { kEkf, kUkf, kCkf };
+    const std::uint32_t kind = stream_.read();
+    const std::uint32_t process = kind % 256;
+    const std::uint32_t filter = kind / 256;
     steps_ = stream_.read();
     read_rule();
-    if (process == kSpeedHeading) replay<SpeedHeading<float>>();
-    if (process == kSpeedHeadingBiasScale) replay<SpeedHeading<float, true, true>>();
-    if (process == kOdometry) replay<Odometry<float>>();
+    if (process == kSpeedHeading) replay<Ekf<SpeedHeading<float>>>();
+    if (process == kSpeedHeadingBiasScale) {
+      using Process = SpeedHeading<float, true, true>;
+      if (filter == kEkf) replay<Ekf<Process>>();
+      if (filter == kUkf) replay<Ukf<Process>>();
+      if (filter == kCkf) replay<Ckf<Process>>();
+    }
+    if (process == kOdometry) {
+      if (filter == kEkf) replay<Ekf<Odometry<float>>>();
+      if (filter == kUkf) replay<Ukf<Odometry<float>>>();
+      if (filter == kCkf) replay<Ckf<Odometry<float>>>();
+    }
   }
 
  private:
@@ -59,15 +74,16 @@ class RobustReplay {
     }
   }
 
-  template <class Process>
+  template <class Plain>
   void replay() {
-    using Filter = Robust<Ekf<Process>, Rule>;
+    using Process = typename Plain::Process;
+    using Filter = Robust<Plain, Rule>;
     typename Process::Params params;
     params.visit([this](const char*, float& value) { value = read(); });
     LeaderRange<float, Process::kStates> sensor;
     sensor.params.sigma_range_m = read();
     sensor.params.sigma_leader_m = read();
-    Filter filter{Ekf<Process>(Process(params)), rule_};
+    Filter filter{Plain(Process(params)), rule_};
     typename Filter::State x0;
     typename Filter::Covariance p0;
     p0.setZero();

@@ -30,8 +30,8 @@ PACKAGES = {
 
 #: Simulated seconds that a replay on the ATmega2560 may take.
 _LIMIT_S = 600
-#: Seconds that any replay may take.
-_TIMEOUT_S = 300
+#: What only a replay that hangs takes, s: an end for the command, no bound on speed.
+_TIMEOUT_S = 1800
 
 
 class ReplayError(RuntimeError):

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from auvest.filters import RobustUkf as RobustUkf
     from auvest.filters import RunResult as RunResult
     from auvest.filters import Ukf as Ukf
+    from auvest.filters.ckf import Ckf as Ckf
     from auvest.intervals import CovarianceBudget as CovarianceBudget
     from auvest.intervals import FixedInterval as FixedInterval
     from auvest.intervals import MahalanobisInterval as MahalanobisInterval
@@ -36,15 +37,20 @@ if TYPE_CHECKING:
     from auvest.kernels import Igg as Igg
     from auvest.kernels import RejectionStreak as RejectionStreak
     from auvest.kernels import Unit as Unit
+    from auvest.models import BodyVelocity as BodyVelocity
     from auvest.models import ConstantAcceleration as ConstantAcceleration
+    from auvest.models import Depth as Depth
     from auvest.models import FunctionProcess as FunctionProcess
     from auvest.models import FunctionSensor as FunctionSensor
     from auvest.models import LeaderRange as LeaderRange
     from auvest.models import MeasurementModel as MeasurementModel
     from auvest.models import Odometry as Odometry
+    from auvest.models import Position as Position
     from auvest.models import ProcessModel as ProcessModel
     from auvest.models import RangeBearing as RangeBearing
+    from auvest.models import RangeBearingElevation as RangeBearingElevation
     from auvest.models import SpeedHeading as SpeedHeading
+    from auvest.models import WhiteAcceleration as WhiteAcceleration
     from auvest.slat import UNKNOWN_MASTER as UNKNOWN_MASTER
     from auvest.slat import DeadReckoning as DeadReckoning
     from auvest.slat import EkfSlat as EkfSlat
@@ -67,6 +73,8 @@ else:
     _SUBMODULES = ("metrics", "montecarlo", "scenarios")
     _HOME = {
         "Aukf": "filters",
+        "BodyVelocity": "models",
+        "Ckf": "filters.ckf",
         "CompassMotion": "slat_models",
         "ConstantAcceleration": "models",
         "ConstantVelocity": "slat_models",
@@ -74,6 +82,7 @@ else:
         "CovarianceBudget": "intervals",
         "DeadReckoning": "slat",
         "Decision": "_core",
+        "Depth": "models",
         "Ekf": "filters",
         "EkfSlat": "slat",
         "FilterError": "errors",
@@ -90,8 +99,10 @@ else:
         "Odometry": "models",
         "Outage": "slat",
         "PiecewiseAcceleration": "slat_models",
+        "Position": "models",
         "ProcessModel": "models",
         "RangeBearing": "models",
+        "RangeBearingElevation": "models",
         "RejectionStreak": "kernels",
         "Report": "filters",
         "RobustEkf": "filters",
@@ -109,6 +120,7 @@ else:
         "Ukf": "filters",
         "UnicycleMotion": "slat_models",
         "Unit": "kernels",
+        "WhiteAcceleration": "models",
         "self_test": "_core",
     }
     __all__ = sorted([*_HOME, *_SUBMODULES])

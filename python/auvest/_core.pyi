@@ -140,6 +140,7 @@ def make_sensor_float64(name: str, states: int, values: _F64) -> Sensor_float64:
 def process_defaults(name: str) -> _Params: ...
 def sensor_defaults(name: str) -> _Params: ...
 def sensor_states(name: str) -> list[int]: ...
+def load_library(path: str) -> None: ...
 def models() -> tuple[list[str], list[tuple[str, int]]]: ...
 
 MAX_FUNCTION_STATES: int
@@ -320,7 +321,7 @@ class Track(metaclass=_Type):
     def position(self) -> _Pair: ...
 
 def simulate_tracking(
-    filter: _Filter[Any],
+    filter: _Filter[Any],  # noqa: A002
     x0: _F32 | _F64,
     P0: _F32 | _F64,
     sensor: _Sensor[Any],
@@ -494,6 +495,7 @@ class _CooperativeDict(TypedDict):
     sigma_speed: float
     sigma_heading: float
     late_steps: int
+    messages_in_flight: int
     most_late_steps: int
 
 def cooperative_defaults() -> _CooperativeDict: ...

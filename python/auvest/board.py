@@ -288,7 +288,7 @@ class Board:
         for_s: float | None = None,
         mcu: str = "atmega2560",
         frequency_hz: int = 16_000_000,
-        input: str | os.PathLike[str] | None = None,  # noqa: A002
+        input: str | os.PathLike[str] | None = None,
         output: str | os.PathLike[str] | None = None,
     ) -> None:
         if isinstance(watch, str):

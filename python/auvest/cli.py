@@ -22,6 +22,10 @@ COMMANDS: Mapping[tuple[str, ...], tuple[str, str]] = {
         "commands.capture",
         "Record what the sketch tracking_loop reports: a CSV file, a figure, a table.",
     ),
+    ("filters",): (
+        "commands.filters",
+        "List the filters: what each takes, and where it runs with the same bits.",
+    ),
     ("import",): (
         "commands.import_log",
         "Turn a published recording into logs for 'auvest replay'.",

@@ -171,6 +171,64 @@ TEST_CASE("explicit scalar: same bits as double") {
   }
 }
 
+/// A vehicle in space: its motion and its sensors.
+template <class Scalar, template <class> class Filter>
+auvest::Vector<Scalar, 6> run_in_space() {
+  using Process = auvest::WhiteAcceleration<Scalar, 3>;
+  Filter<Process> filter{Process()};
+  auvest::Vector<Scalar, 6> x;
+  auvest::Matrix<Scalar, 6, 6> p;
+  const double start[6] = {30, -40, 20, 0.5, 0.2, 0.1};
+  for (int i = 0; i < 6; ++i) {
+    x(i) = Scalar(start[i]);
+    for (int j = 0; j < 6; ++j) p(i, j) = Scalar(i == j ? 0.5 : 0.0);
+  }
+  REQUIRE(filter.reset(x, p) == auvest::Status::kOk);
+  typename auvest::BodyVelocity<Scalar, 6, 3>::Params at;
+  at.heading_rad = Scalar(0.3);
+  for (int k = 0; k < 20; ++k) {
+    REQUIRE(filter.predict(Scalar(1)) == auvest::Status::kOk);
+    auvest::Vector<Scalar, 3> fix;
+    fix(0) = Scalar(30 + 0.6 * k);
+    fix(1) = Scalar(-40.5 + 0.1 * k);
+    fix(2) = Scalar(19);
+    auvest::Vector<Scalar, 1> depth;
+    depth(0) = Scalar(20 + 0.1 * k);
+    auvest::Vector<Scalar, 3> velocity;
+    velocity(0) = Scalar(0.6);
+    velocity(1) = Scalar(0.02 * k);
+    velocity(2) = Scalar(-0.1);
+    const auvest::BodyVelocity<Scalar, 6, 3> log(at);
+    REQUIRE(log.check() == auvest::Status::kOk);
+    REQUIRE(auvest::Position<Scalar, 6, 3>().check() == auvest::Status::kOk);
+    REQUIRE(filter.update(fix, auvest::Position<Scalar, 6, 3>()).status == auvest::Status::kOk);
+    REQUIRE(filter.update(depth, auvest::Depth<Scalar, 6>()).status == auvest::Status::kOk);
+    REQUIRE(filter.update(velocity, log).status == auvest::Status::kOk);
+    auvest::RangeBearingElevation<Scalar, 6> usbl;
+    usbl.params.near_field = Scalar(k % 2 == 0 ? 5 : 1000);  // far and near
+    REQUIRE(usbl.check() == auvest::Status::kOk);
+    auvest::Vector<Scalar, 3> angles;
+    angles(0) = Scalar(54);
+    angles(1) = Scalar(-0.9 + 0.005 * k);
+    angles(2) = Scalar(0.38);
+    const auto seen = filter.update(angles, usbl);
+    REQUIRE(seen.status == auvest::Status::kOk);
+    CHECK(seen.near_field == (k % 2 != 0));
+  }
+  return filter.x();
+}
+
+TEST_CASE("explicit scalar: a vehicle in space too") {
+  const auto a = run_in_space<ExplicitDouble, auvest::Ukf>();
+  const auto b = run_in_space<double, auvest::Ukf>();
+  const auto c = run_in_space<ExplicitDouble, auvest::Ekf>();
+  const auto d = run_in_space<double, auvest::Ekf>();
+  for (int i = 0; i < 6; ++i) {
+    CHECK(double(a(i)) == b(i));
+    CHECK(double(c(i)) == d(i));
+  }
+}
+
 /// SLATF, SlatfJoint, EKF-SLAT and dead reckoning over a few steps; the slave's estimates one after
 /// the other.
 template <class Scalar>

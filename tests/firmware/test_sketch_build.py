@@ -226,7 +226,8 @@ def test_a_sketch_runs(build_sketch):
     if shutil.which("simavr") is None:
         pytest.fail("simavr is not installed: install simavr")
     command = ["simavr", "-m", "atmega2560", "-f", "16000000", build_sketch(MIXED).elf]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    # It ends by itself; the timeout is for a sketch that hangs, not for a slow machine.
+    done = subprocess.run(command, capture_output=True, text=True, timeout=900)
     lines = re.findall(r"\x1b\[32m(.*)\.\.\n", done.stderr)  # it prints CR and LF as dots
     eigen = ["11.500", "-15.500", "4.472", "3.000", "-4.500"]
     assert lines == [*eigen, "2.500", "-3"], done.stderr

@@ -1,4 +1,4 @@
-"""Records of the robust EKF for every target; ``firmware/parity/replay_robust.hpp`` reads them."""
+"""Records of the robust filters, for every target (``firmware/parity/replay_robust.hpp``)."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, field
 import numpy as np
 
 from auvest import (
+    Ckf,
     FilterError,
     Hampel,
     Huber,
@@ -15,10 +16,12 @@ from auvest import (
     Odometry,
     RejectionStreak,
     RobustEkf,
+    RobustUkf,
     SpeedHeading,
     Status,
     Unit,
 )
+from auvest.filters import GaussianFilter
 from auvest.kernels import Kernel
 from tests.parity.python_leg import bits
 
@@ -56,7 +59,7 @@ def trace_type(states: int) -> np.dtype:
 
 @dataclass(frozen=True, eq=False)
 class RobustRecord:
-    """A robust EKF and what happens to it."""
+    """A robust filter and what happens to it."""
 
     name: str
     steps: np.ndarray
@@ -65,6 +68,7 @@ class RobustRecord:
     kernel: Kernel = field(default_factory=Igg)
     rejections: int = 6
     residual: str = "innovation"
+    filter: type[GaussianFilter] = RobustEkf
     x0: tuple[float, ...] = (0.0, 0.0)
     P0: np.ndarray = field(default_factory=lambda: np.eye(2, dtype=np.float32))
 
@@ -75,6 +79,7 @@ class RobustRecord:
     def to_bytes(self) -> bytes:
         """The record as the replay programs read it."""
         kind = 2 if isinstance(self.process, Odometry) else 1 if self.process.heading_bias else 0
+        kind += 256 * self.filter._linearisation
         thresholds = [*asdict(self.kernel).values(), 1.0, 2.0, 3.0][:3]
         parameters = [v for k, v in asdict(self.process).items() if not isinstance(v, bool)]
         sensor = [self.sensor.sigma_range_m, self.sensor.sigma_leader_m]
@@ -96,7 +101,7 @@ class RobustRecord:
     def replay_in_python(self) -> np.ndarray:
         """Run the record through the public class and give its trace."""
         recovery = RejectionStreak(rejections=self.rejections) if self.rejections else None
-        f = RobustEkf(
+        f = self.filter(
             self.x0,
             self.P0,
             process=self.process,
@@ -177,10 +182,15 @@ def refusals() -> np.ndarray:
 
 
 def all_records() -> list[RobustRecord]:
-    """All records of the robust EKF."""
+    """All records of the robust filters."""
     four = {"x0": (0.0, 0.0, 0.0, 0.0), "P0": np.diag([4, 4, 0.01, 0.01]).astype(np.float32)}
     both = SpeedHeading(heading_bias=True, speed_scale=True)
     lost = {"x0": (150.0, -130.0)}
+    turning = {
+        "process": Odometry(),
+        "x0": (0.0, 0.0, 0.0),
+        "P0": np.diag([1, 1, 0.01]).astype(np.float32),
+    }
     return [
         RobustRecord("robust-igg", cruise(1200, 1), sensor=LeaderRange(sigma_leader_m=0.5)),
         RobustRecord("robust-unit", cruise(100, 2), kernel=Unit(), rejections=0),
@@ -192,9 +202,24 @@ def all_records() -> list[RobustRecord]:
         RobustRecord(
             "robust-odometry",
             cruise(200, 9, odometry=True),
-            process=Odometry(),
-            x0=(0.0, 0.0, 0.0),
-            P0=np.diag([1, 1, 0.01]).astype(np.float32),
+            **turning,
+        ),
+        *(
+            record
+            for name, kind in (("robust-ukf", RobustUkf), ("ckf", Ckf))
+            for record in (
+                RobustRecord(
+                    f"{name}-odometry", cruise(200, 12, odometry=True), filter=kind, **turning
+                ),
+                RobustRecord(
+                    f"{name}-bias-scale",
+                    cruise(200, 13),
+                    filter=kind,
+                    process=both,
+                    kernel=Hampel(),
+                    **four,
+                ),
+            )
         ),
         RobustRecord("robust-refusals", refusals()),
         RobustRecord(

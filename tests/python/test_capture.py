@@ -5,12 +5,13 @@ The real sketch on the simulated board is recorded in tests/firmware.
 
 from __future__ import annotations
 
+import fcntl
+import itertools
 import json
 import math
 import os
 import signal
 import struct
-import subprocess
 import sys
 import termios
 import threading
@@ -18,9 +19,11 @@ import time
 import tty
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from processes import PATIENCE_S, lines_of, start_program, wait_until
 from typer.testing import CliRunner, Result
 
 from auvest import board, telemetry
@@ -109,6 +112,17 @@ def test_numbers_keep_their_bits() -> None:
     assert math.isnan(row["e"])  # what Arduino prints for more than 2^32
 
 
+@pytest.mark.parametrize(
+    "name",
+    ["sample", "time_s", "resamplings", "status", "missed", "refused", "late", "awake_us"],
+)
+def test_eight_digits_of_a_count_are_a_number_and_of_a_float_its_bits(name: str) -> None:
+    reader = Reader("SLAVE")
+    reader.read(f"# columns: {name},speed_m_s")
+    row = reader.read(telemetry.frame("SLAVE,40490000,40490000"))
+    assert row == {name: 40490000.0, "speed_m_s": 3.140625}  # 2 (1 + 0x490000 / 2^23)
+
+
 def test_samples_need_the_names_of_their_columns() -> None:
     reader = Reader()
     with pytest.raises(LineError, match="reset the board"):
@@ -131,6 +145,25 @@ def test_requests() -> None:
     for line in ("$PING,17*00", "$PING,", telemetry.frame("PING,x"), sample_line(1), "#"):
         assert telemetry.requested_sample(line) is None
     assert telemetry.answer(17, 1.5, -0.25) == telemetry.frame("SONAR,17,1.500000,-0.250000")
+
+
+def test_requests_of_the_odometer() -> None:
+    """What is asked of one instrument is not asked of the other."""
+    asked = telemetry.frame("ODO,3")
+    assert telemetry.requested_sample(asked, "ODO") == 3
+    assert telemetry.requested_sample(asked) is None
+    assert telemetry.requested_sample(telemetry.frame("PING,3"), "ODO") is None
+
+
+def test_an_answer_is_given_to_the_micrometre_and_microradian() -> None:
+    """Half of that more or less is rounded."""
+    body = telemetry.body_of(telemetry.answer(3, 12.3456784, -1.2345676))
+    assert body == "SONAR,3,12.345678,-1.234568"
+
+
+def test_a_checksum_has_two_digits() -> None:
+    assert telemetry.frame("AB") == "$AB*03"  # 0x41 xor 0x42
+    assert telemetry.body_of("$AB*03") == "AB"
 
 
 # ---- The simulated sonar -------------------------------------------------------------------------
@@ -175,12 +208,17 @@ def test_dropouts_and_seeds() -> None:
 # ---- A board behind a serial port ----------------------------------------------------------------
 
 
+#: A pseudo-terminal in packet mode: its other side has thrown away what it had received.
+TIOCPKT_FLUSHREAD = 1
+
+
 class PortWithBoard:
     """A pseudo-terminal; a thread speaks as the board. Answers that it gets are kept."""
 
     def __init__(self) -> None:
         self.master, slave = os.openpty()
         tty.setraw(slave)
+        self._tell_of_flushes(True)
         self.name = os.ttyname(slave)
         self.slave = slave
         self.answers: list[str] = []
@@ -193,10 +231,13 @@ class PortWithBoard:
         script(self)
 
     def wait_until_open(self) -> None:
-        """Whoever opens the port sets its speed, and then throws away what came before."""
-        while termios.tcgetattr(self.slave)[4] != termios.B115200:
-            time.sleep(0.02)
-        time.sleep(0.2)
+        """Whoever opens the port throws away what came before: return when that is done."""
+        while not os.read(self.master, 1)[0] & TIOCPKT_FLUSHREAD:
+            pass
+        self._tell_of_flushes(False)
+
+    def _tell_of_flushes(self, wanted: bool) -> None:
+        fcntl.ioctl(self.master, termios.TIOCPKT, struct.pack("i", wanted))
 
     def say(self, text: str, end: str = "\r\n") -> None:
         os.write(self.master, (text + end).encode("latin-1"))
@@ -284,7 +325,7 @@ def test_an_unplugged_board_keeps_its_samples(port: PortWithBoard, tmp_path: Pat
         board.say(HEADER)
         for k in range(1, 4):
             board.say(sample_line(k))
-        time.sleep(0.3)
+        wait_until(lambda: lines_of(tmp_path / "record.csv") == 4, "the samples are recorded")
         board.unplug()
 
     port.speak(script)
@@ -311,12 +352,19 @@ def test_a_board_that_was_not_reset(
     port: PortWithBoard, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its samples have come without the names of their columns: say what helps."""
-    monkeypatch.setattr(capture, "SILENCE_S", 0.5)
+    said = threading.Event()
 
     def script(board: PortWithBoard) -> None:
         for k in range(1, 6):
             board.say(telemetry.frame(f"PING,{k}"))
             board.say(sample_line(k))
+        said.set()
+
+    # The clock stands until all is said; then a second goes by with each line that is read.
+    seconds = itertools.count()
+    clock = SimpleNamespace(monotonic=lambda: next(seconds) if said.is_set() else 0)
+    monkeypatch.setattr(capture, "time", clock)
+    monkeypatch.setattr(capture, "SILENCE_S", 5)
 
     port.speak(script)
     result = call("--port", port.name, "--output", str(tmp_path))
@@ -338,20 +386,16 @@ def test_interrupt_keeps_all_that_has_come(
 ) -> None:
     """Without --steps Ctrl-C is how a recording ends; with it, it is an interruption."""
     command = [sys.executable, "-m", "auvest", "capture", "--port", port.name, *steps]
-    with subprocess.Popen(
-        [*command, "--output", str(tmp_path), "--no-figure"],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    ) as process:  # fmt: skip
-        record = tmp_path / "record.csv"
-        deadline = time.monotonic() + 60
+    with start_program([*command, "--output", tmp_path, "--no-figure"]) as process:
         port.wait_until_open()
         port.say(HEADER)
         for k in range(1, 4):
             port.say(sample_line(k))
-        while len(record.read_text().splitlines()) < 4 and time.monotonic() < deadline:
-            time.sleep(0.05)  # each sample is on the disk before the command has ended
+        # Each sample is on the disk before the command has ended.
+        record = tmp_path / "record.csv"
+        wait_until(lambda: lines_of(record) == 4, "the samples are recorded", process)
         process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=60)
+        out, err = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == code, err
     assert "3 samples" in plain(out)
     assert ("interrupted: 3 of 9" in plain(err)) == (code == 130)

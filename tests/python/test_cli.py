@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from processes import PATIENCE_S, start_program, wait_until
 from typer.testing import CliRunner, Result
 
 from auvest.cli import app
@@ -316,29 +317,19 @@ def test_interrupt_before_anything_is_done(tmp_path: Path, monkeypatch: pytest.M
 def interrupt_after(seconds: float, command: list[str], cwd: Path) -> tuple[int, str, str]:
     """Run a command, interrupt it at work, and return its exit code, stdout and stderr."""
     output = cwd / f"after-{seconds}"
-    program = subprocess.Popen(
-        [*command, "--output", str(output)],
-        cwd=cwd,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        # A shell that runs the tests in the background has them ignore the signal.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    )
-    deadline = time.monotonic() + 120
-    while not output.exists() and program.poll() is None:  # made just before the work
-        assert time.monotonic() < deadline, "the work has not begun"
-        time.sleep(0.1)
+    program = start_program([*command, "--output", output], cwd=cwd)
+    wait_until(output.exists, "the work has not begun", program)  # made just before it
     time.sleep(seconds)
     program.send_signal(signal.SIGINT)
-    out, err = program.communicate(timeout=120)
+    out, err = program.communicate(timeout=PATIENCE_S)
     return program.returncode, out, err
 
 
 def test_ctrl_c_keeps_the_runs_done(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "auvest", "simulate", "aukf", "--json", "--no-figure"]
     command += ["--runs", "90000", "--steps", "110", "--workers", "1"]
-    for seconds in (1, 10, 40):  # a busy machine takes longer
+    # On any machine one of these lies between the first chunk and the last, 20 times as late.
+    for seconds in (2.0**k for k in range(9)):
         code, out, err = interrupt_after(seconds, command, tmp_path)
         if out:
             break
@@ -354,7 +345,7 @@ def test_as_a_program(tmp_path: Path) -> None:
         capture_output=True,
         text=True,
         check=False,
-        timeout=60,
+        timeout=PATIENCE_S,
     )
     assert done.returncode == 0
     assert done.stderr == ""

@@ -119,7 +119,7 @@ def test_range_bearing_of_one_state_and_of_many():
 def test_defaults_are_those_of_the_core():
     for kind in auvest.models.SENSORS.values():
         assert kind().values("float64").tolist() == list(
-            _core.sensor_defaults(kind.__name__).values()
+            _core.sensor_defaults(kind().core_name).values()
         )
     for kind in auvest.models.PROCESSES.values():
         model = kind()

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from auvest.logs import CsvTable, LogError, LogFolder, Stream, merge, reader
+from auvest.logs import FILES, Column, CsvTable, LogError, LogFolder, Stream, merge, reader
 from auvest.logs.importers import IMPORTERS
 from auvest.logs.write import write_file
 
@@ -111,6 +112,48 @@ def test_line_numbers_are_those_of_the_file_in_later_chunks_too(
     assert caught.value.line == 10  # the header is line 1
 
 
+@pytest.mark.parametrize("lines", [2, 100])
+def test_a_file_that_is_read_as_a_whole_must_be_small(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lines: int
+) -> None:
+    monkeypatch.setattr(reader, "SMALL_FILE_LINES", 10)
+    monkeypatch.setattr(reader, "CHUNK_LINES", lines)
+    path = write(tmp_path, "ranges.csv", HEAD + "1,0,5\n" * 8)
+    assert len(read(path)) == 8
+    path = write(tmp_path, "ranges.csv", HEAD + "1,0,5\n" * 10)
+    with pytest.raises(LogError, match=r"ranges\.csv: has more than 10 lines"):
+        read(path)
+
+
+ALL_COLUMNS = sorted(
+    {(name, column) for name, layouts in FILES.items() for layout in layouts for column in layout},
+    key=lambda pair: (pair[0], pair[1].name),
+)
+
+
+@pytest.mark.parametrize(
+    ("name", "column"), ALL_COLUMNS, ids=[f"{name}-{column.name}" for name, column in ALL_COLUMNS]
+)
+def test_the_limits_of_a_column_are_read_and_nothing_beyond(
+    tmp_path: Path, name: str, column: Column
+) -> None:
+    layout = next(layout for layout in FILES[name] if column in layout)
+    header = ",".join(other.name for other in layout)
+
+    def table(value: float) -> Path:
+        cells = (repr(value) if other is column else "0" for other in layout)
+        return write(tmp_path, name, f"{header}\n{','.join(cells)}\n")
+
+    at = layout.index(column)
+    for limit, beyond in ((column.low, -math.inf), (column.high, math.inf)):
+        assert read(table(float(limit)))[0, at] == limit
+        step = math.copysign(1.0, beyond)
+        next_one = limit + step if column.integer else math.nextafter(limit, beyond)
+        with pytest.raises(LogError, match=re.escape(f"is not {column.expected}")) as caught:
+            read(table(next_one))
+        assert (caught.value.line, caught.value.column) == (2, column.name)
+
+
 def test_not_text_and_not_there(tmp_path: Path) -> None:
     path = tmp_path / "ranges.csv"
     with pytest.raises(LogError, match="cannot be read"):
@@ -158,6 +201,34 @@ def test_a_shuffled_file_is_an_error_where_order_matters(tmp_path: Path) -> None
     shuffled = stream(tmp_path, [0, 5, 4, 6], late_s=0.5, required=True)
     with pytest.raises(LogError, match=r"line 4.*1 s older.*window.*0\.5 s: shuffled"):
         merged(shuffled)
+
+
+def test_lines_of_one_time_keep_the_order_of_the_file(tmp_path: Path) -> None:
+    """Many of them, late ones too: sources 0 to 99 at 4 s, recorded after a line of 5 s."""
+    one = stream(tmp_path, [0, 5] + [4] * 100 + [5, 5], late_s=2.0)
+    (rows,) = merged(one)
+    assert rows[:, 0].tolist() == [0] + [4] * 100 + [5] * 3
+    assert rows[:, 1].tolist() == [0, *range(2, 102), 1, 102, 103]
+    assert (one.late.reordered, one.late.dropped) == (100, 0)
+
+
+def test_the_window_for_late_lines_is_as_long_as_it_says(tmp_path: Path) -> None:
+    one = stream(tmp_path, [0, 10, 8, 7.999], late_s=2.0)
+    (rows,) = merged(one)
+    assert rows[:, 0].tolist() == [0, 8, 10]
+    assert (one.late.reordered, one.late.dropped, one.late.lines) == (1, 1, [5])
+
+
+@pytest.mark.parametrize("lines", [2, 3, 100])
+def test_the_first_lines_that_came_too_late_are_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lines: int
+) -> None:
+    """Every other of 18 lines, from line 3 on: nine are dropped, five are named."""
+    monkeypatch.setattr(reader, "CHUNK_LINES", lines)
+    one = stream(tmp_path, [t for k in range(9) for t in (10 + k, k)], late_s=0.0)
+    (rows,) = merged(one)
+    assert rows[:, 0].tolist() == list(range(10, 19))
+    assert (one.late.dropped, one.late.lines) == (9, [3, 5, 7, 9, 11])
 
 
 @pytest.mark.parametrize("lines", [1, 7, 1000])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import subprocess
 import sys
@@ -13,6 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from processes import PATIENCE_S, start_program, wait_until
 
 from auvest import montecarlo
 from auvest._core import Random
@@ -45,6 +45,20 @@ def test_the_chunk_does_not_matter_either() -> None:
     assert montecarlo.run(task, 20, chunk=3)["series"].tobytes() == whole["series"].tobytes()
 
 
+@pytest.mark.parametrize(
+    ("runs", "rows", "workers", "chunk"),
+    [
+        (100, 60, 5, 5),  # four chunks for each worker
+        (101, 60, 5, 6),
+        (3, 60, 5, 1),
+        (10_000, 250_000, 5, 2),  # at most half a million rows in one
+        (10_000, 500_001, 5, 1),  # but a run is never parted
+    ],
+)
+def test_chunks_are_small_and_even(runs: int, rows: int, workers: int, chunk: int) -> None:
+    assert montecarlo.chunk_for(runs, rows, workers) == chunk
+
+
 def test_csv_keeps_all_digits(tmp_path: Path) -> None:
     columns = montecarlo.run(task, 9)
     columns["value"][4] = np.nan
@@ -74,7 +88,8 @@ import test_montecarlo as t
 from auvest import montecarlo
 
 def slow(first, count):
-    time.sleep(0.05)
+    if first >= {stop}:
+        time.sleep(3600)  # until it is killed
     with open({log!r}, "a") as file:
         file.write(f"{{first}}\\n")
     return t.task(first, count)
@@ -88,21 +103,23 @@ montecarlo.write_table(Path({table!r}), columns)
 
 def test_a_killed_program_goes_on_where_it_stood(tmp_path: Path) -> None:
     log, store, table = (tmp_path / name for name in ("log", "store", "table.csv"))
-    program = PROGRAM.format(
-        tests=str(Path(__file__).parent), log=str(log), store=str(store), table=str(table)
-    )
-    command = [sys.executable, "-c", program]
-    with subprocess.Popen(command) as first:
-        deadline = time.monotonic() + 60
-        while len(list(store.glob("*.npz"))) < 6 and time.monotonic() < deadline:
-            time.sleep(0.01)
-        os.kill(first.pid, signal.SIGKILL)
+
+    def command(stop: int) -> list[str]:
+        program = PROGRAM.format(
+            tests=str(Path(__file__).parent), log=str(log), store=str(store), table=str(table),
+            stop=stop,
+        )  # fmt: skip
+        return [sys.executable, "-c", program]
+
+    with start_program(command(stop=40)) as first:
+        wait_until(lambda: len(list(store.glob("*.npz"))) >= 6, "six chunks are kept", first)
+        first.kill()
     assert first.returncode == -signal.SIGKILL
     kept = len(list(store.glob("*.npz")))
-    assert 6 <= kept < 30
+    assert 6 <= kept <= 20  # it could not go on beyond
     assert not table.exists()
     before = len(log.read_text().splitlines())
-    subprocess.run(command, check=True, timeout=60)
+    subprocess.run(command(stop=60), check=True, timeout=PATIENCE_S)
     again = len(log.read_text().splitlines()) - before
     assert again == 30 - kept
     unbroken = montecarlo.write_table(tmp_path / "unbroken.csv", montecarlo.run(task, 60))
@@ -134,6 +151,42 @@ def test_a_damaged_chunk_is_done_again(tmp_path: Path) -> None:
     assert sorted(calls) == [0, 5, 10, 15]
     montecarlo.discard(store)
     assert not store.exists()
+
+
+def test_a_store_is_of_one_experiment_in_one_division(tmp_path: Path) -> None:
+    store = tmp_path / "store"
+    calls: list[int] = []
+
+    def counted(first: int, count: int) -> Columns:
+        calls.append(first)
+        return task(first, count)
+
+    def again(chunk: int, settings: dict[str, Any]) -> list[tuple[int, int]]:
+        calls.clear()
+        progress: list[tuple[int, int]] = []
+        montecarlo.run(
+            counted, 20, chunk=chunk, store=store, settings=settings,
+            progress=lambda *both: progress.append(both),
+        )  # fmt: skip
+        return progress
+
+    again(5, {"a": 1, "b": 2})
+    assert sorted(calls) == [0, 5, 10, 15]
+    # The order in which settings are named does not matter; what is kept counts as done.
+    assert again(5, {"b": 2, "a": 1}) == [(5, 20), (10, 20), (15, 20), (20, 20)]
+    assert calls == []
+    # Other chunks are another division: nothing of the first is left to be mistaken for it.
+    again(10, {"a": 1, "b": 2})
+    assert sorted(calls) == [0, 10]
+    assert sorted(path.name for path in store.iterdir()) == ["0-9.npz", "10-19.npz", "experiment"]
+
+
+def test_a_table_that_cannot_be_written_leaves_the_old_one(tmp_path: Path) -> None:
+    path = montecarlo.write_table(tmp_path / "t.csv", {"a": np.arange(2)})
+    before = path.read_bytes()
+    with pytest.raises(ValueError, match="shorter"):
+        montecarlo.write_table(path, {"a": np.arange(3), "b": np.arange(2)})
+    assert path.read_bytes() == before == b"a\n0\n1\n"
 
 
 def test_interrupt_keeps_what_is_done(tmp_path: Path) -> None:

@@ -9,7 +9,6 @@ import re
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from dataclasses import fields, replace
 from pathlib import Path
@@ -21,9 +20,20 @@ import pyarrow.csv as pa_csv
 import pyarrow.parquet as pa_parquet
 import pytest
 from conftest import ROOT
+from processes import PATIENCE_S, start_program, wait_until
 from typer.testing import CliRunner
 
-from auvest import Aukf, CovarianceBudget, LeaderRange, Odometry, RangeBearing, RobustEkf
+from auvest import (
+    Aukf,
+    CovarianceBudget,
+    FixedInterval,
+    LeaderRange,
+    MahalanobisInterval,
+    Odometry,
+    RangeBearing,
+    RobustEkf,
+    RobustUkf,
+)
 from auvest.cli import app
 from auvest.logs import FILES, LogError, LogFolder, reader
 from auvest.logs.write import write_file
@@ -307,6 +317,235 @@ def test_every_range_is_accounted_for(tmp_path: Path) -> None:
     np.testing.assert_allclose(held[[5, 10]], 0.0, atol=1e-9)
 
 
+def standing_log(folder: Path, *, start_s: float, ranges: list[tuple[float, float]]) -> None:
+    """A craft that stands at (1, 2), 10 m from its only beacon, and takes these ranges."""
+    time_s = np.arange(-2.0, 11.0)
+    write_file(folder, "odometry.csv", time_s=time_s, forward_m=0 * time_s, left_m=0 * time_s,
+               turn_rad=0 * time_s)  # fmt: skip
+    start(folder, time_s=start_s)
+    write_file(folder, "beacons.csv", source=[3], x_m=[11.0], y_m=[2.0])
+    times, sizes = zip(*ranges, strict=True)
+    write_file(folder, "ranges.csv", time_s=times, source=[3] * len(times), range_m=sizes)
+
+
+def test_a_range_at_the_start_and_one_at_the_end_are_used(tmp_path: Path) -> None:
+    cases = [(1.499, 10.0), (1.5, 10.5), (10.0, 9.0), (10.001, 10.0)]
+    standing_log(tmp_path, start_s=1.5, ranges=cases)
+    tables = run(tmp_path, settings_from(SURE), "ekf")
+    assert outcomes(tables) == ["before start", "accepted", "accepted", "after end"]
+    # Measured less expected.
+    np.testing.assert_allclose(
+        tables["measurements"]["innovation_0"][1:3], [0.5, -1.0], rtol=0, atol=1e-9
+    )
+
+
+def test_when_it_was_taken_goes_before_from_where(tmp_path: Path) -> None:
+    """Nobody knows where source 8 is; before the start and after the end it does not matter."""
+    standing_log(tmp_path, start_s=1.5, ranges=[(2.0, 10.0)])
+    time_s = [1.0, 2.0, 10.0, 10.5]
+    write_file(tmp_path, "ranges.csv", time_s=time_s, source=[8] * 4, range_m=[10.0] * 4)
+    assert outcomes(run(tmp_path, settings_from(SURE), "ekf")) == [
+        "before start", "no position", "no position", "after end",
+    ]  # fmt: skip
+
+
+def test_a_held_out_range_says_how_much_too_long_the_prediction_was(tmp_path: Path) -> None:
+    cases = [(1.0, 10.0), (2.0, 8.0), (3.0, 11.5), (6.0, 10.0)]
+    standing_log(tmp_path, start_s=0.0, ranges=cases)
+    settings = settings_from({**SURE, "ranges": {"every_s": 5.0}})
+    tables = run(tmp_path, settings, "ekf")
+    assert outcomes(tables) == ["accepted", "held out", "held out", "accepted"]
+    held = tables["measurements"]["held_out_error_m"]
+    np.testing.assert_allclose(held[1:3], [2.0, -1.5], rtol=0, atol=1e-9)
+    numbers = replay(LogFolder(tmp_path), settings, filter_name="ekf").numbers
+    assert numbers["held_out_rmse_m"] == pytest.approx(math.sqrt((4 + 2.25) / 2))
+
+
+def test_an_increment_that_ends_at_the_start_is_left_out(tmp_path: Path) -> None:
+    """The craft starts at (1, 2) towards +x when its second increment ends."""
+    standing_log(tmp_path, start_s=1.0, ranges=[(3.0, 8.0)])
+    write_file(tmp_path, "odometry.csv", time_s=[0.5, 1.0, 2.0, 3.0],
+               forward_m=[100.0, 50.0, 1.5, 0.5], left_m=[0.0] * 4, turn_rad=[0.0] * 4)  # fmt: skip
+    estimates = run(tmp_path, settings_from(SURE), "ekf")["estimates"]
+    np.testing.assert_array_equal(estimates["time_s"], [2.0, 3.0])
+    np.testing.assert_allclose(estimates["dead_reckoned_x_m"], [2.5, 3.0], rtol=1e-12)
+    np.testing.assert_array_equal(estimates["dead_reckoned_y_m"], 2.0)
+
+
+@pytest.mark.parametrize("lines", [1, 100])
+def test_velocities_before_the_start_count_as_the_last_of_them_at_the_start(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lines: int
+) -> None:
+    monkeypatch.setattr(reader, "CHUNK_LINES", lines)
+    tables = []
+    for name, time_s, speed in (
+        ("before", [-3.0, -1.0, 2.0], [7.0, 1.0, 0.5]),
+        ("at", [0.0, 2.0], [1.0, 0.5]),
+    ):
+        folder = tmp_path / name
+        standing_log(folder, start_s=0.0, ranges=[(1.0, 9.0), (4.0, 7.0)])
+        write_file(folder, "odometry.csv", time_s=time_s, speed_m_s=speed,
+                   yaw_rate_rad_s=[0.0] * len(speed))  # fmt: skip
+        tables.append(run(folder, settings_from(SURE), "ekf"))
+    before, at = tables
+    # 1 m/s for 2 s, then 0.5 m/s for 2 s, from x = 1 on.
+    assert before["estimates"]["dead_reckoned_x_m"][-1] == pytest.approx(4.0)
+    np.testing.assert_allclose(before["measurements"]["innovation_0"], 0.0, atol=1e-9)
+    for name in ESTIMATES:
+        np.testing.assert_array_equal(before["estimates"][name], at["estimates"][name], name)
+
+
+@pytest.mark.parametrize(("sigma_m", "expected"), [(None, 1.5), (0.0, 1.5), (2.0, 2.5)])
+def test_a_leaders_sigma_adds_to_that_of_the_range(
+    tmp_path: Path, sigma_m: float | None, expected: float
+) -> None:
+    """Where the craft knows its place, S is R: 1.5^2, and 1.5^2 + 2^2 = 2.5^2."""
+    standing_log(tmp_path, start_s=0.0, ranges=[(2.0, 10.0)])
+    (tmp_path / "beacons.csv").unlink()
+    known = {} if sigma_m is None else {"sigma_m": [sigma_m] * 3}
+    write_file(tmp_path, "leaders.csv", time_s=[1.0, 2.0, 3.0], source=[3] * 3, x_m=[11.0] * 3,
+               y_m=[2.0] * 3, **known)  # fmt: skip
+    settings = settings_from({**SURE, "ranges": {"sigma_m": 1.5}})
+    measured = run(tmp_path, settings, "ekf")["measurements"]
+    assert measured["outcome"].tolist() == ["accepted"]
+    assert measured["sigma_0"][0] == pytest.approx(expected, rel=1e-9)
+
+
+#: Far enough for a range to be a measurement along x and nothing else.
+FAR_M = 5e4
+
+
+def far_log(folder: Path, ranges: list[tuple[float, float]]) -> None:
+    """A craft that stands at (1, 2) and ranges along x: errors of what it measures, m."""
+    standing_log(folder, start_s=0.0, ranges=[(t, FAR_M + error) for t, error in ranges])
+    write_file(folder, "beacons.csv", source=[3], x_m=[1.0 + FAR_M], y_m=[2.0])
+
+
+STANDING = {
+    "start": {"sigma_position_m": 2.0},
+    "odometry": {"sigma_distance": 0.0, "sigma_drift": 0.0, "sigma_turn": 0.0},
+    "ranges": {"sigma_m": 1.5},
+}
+
+
+def test_one_range_by_hand(tmp_path: Path) -> None:
+    """2 m and a range of 1.5 m make 1.2 m along it; across it 2 m stay.
+
+    It is 2.5 m too long: the craft seems to stand 4 / (4 + 2.25) of that further away, at -0.6 m.
+    All to 0.1 mm: the circle around the beacon bends by 4 / (2 FAR_M).
+    """
+
+    far_log(tmp_path, [(2.0, 2.5)])
+    write_file(tmp_path, "truth.csv", time_s=[-1.0, 0.0, 1.0, 2.0, 3.0], x_m=[1.0] * 5,
+               y_m=[2.0] * 5)  # fmt: skip
+    tables = run(tmp_path, settings_from(STANDING), "ekf")
+    measured = {name: values[0] for name, values in tables["measurements"].items()}
+    assert measured["innovation_0"] == pytest.approx(2.5, abs=1e-4)
+    assert measured["sigma_0"] == pytest.approx(2.5, abs=1e-4)
+    assert measured["nis"] == pytest.approx(1.0, abs=1e-4)
+    assert measured["weight_0"] == 1.0
+    assert math.isnan(measured["weight_1"])
+    last = {name: values[-1] for name, values in tables["estimates"].items()}
+    assert (last["x_m"], last["y_m"]) == pytest.approx((-0.6, 2.0), abs=1e-4)
+    assert (last["var_x_m2"], last["var_y_m2"]) == pytest.approx((1.44, 4.0), abs=1e-4)
+    assert last["cov_xy_m2"] == pytest.approx(0.0, abs=1e-4)
+    errors = tables["errors"]
+    # What the truth was at the start counts, what it was before does not.
+    assert errors["time_s"].tolist() == [0.0, 1.0, 2.0, 3.0]
+    np.testing.assert_allclose(errors["error_x_m"], [0.0, 0.0, -1.6, -1.6], atol=1e-4)
+    np.testing.assert_allclose(errors["error_y_m"], 0.0, atol=1e-4)
+    np.testing.assert_allclose(errors["sigma_x_m"], [2.0, 2.0, 1.2, 1.2], atol=1e-4)
+    np.testing.assert_allclose(errors["sigma_y_m"], 2.0, atol=1e-4)
+    numbers = replay(LogFolder(tmp_path), settings_from(STANDING), filter_name="ekf").numbers
+    assert numbers["rmse_m"] == pytest.approx(1.6 / math.sqrt(2), abs=1e-4)
+    assert numbers["max_error_m"] == pytest.approx(1.6, abs=1e-4)
+    assert numbers["inside_3_sigma"] == 1.0
+
+
+def test_dead_reckoning_is_off_along_both_axes(tmp_path: Path) -> None:
+    far_log(tmp_path, [(2.0, 0.0)])
+    write_file(tmp_path, "truth.csv", time_s=[5.0], x_m=[1.0 - 3.0], y_m=[2.0 + 4.0])
+    errors = run(tmp_path, settings_from(STANDING), "ekf")["errors"]
+    assert errors["dead_reckoned_error_m"][0] == pytest.approx(5.0)
+
+
+@pytest.mark.parametrize(("filter_name", "recovered"), [("robust-ekf", 1), ("ekf", 0)])
+def test_only_the_robust_filter_recovers(tmp_path: Path, filter_name: Any, recovered: int) -> None:
+    """Four ranges 60 m too long: 4, 11, 18, 25 are more than the 24 of six rejections."""
+    far_log(tmp_path, [(1.0, 60.0), (2.0, 60.0), (3.0, 60.0), (4.0, 60.0)])
+    result = replay(LogFolder(tmp_path), settings_from(STANDING), filter_name=filter_name)
+    assert result.numbers["recovered"] == recovered
+    assert result.numbers["rejected"] == 4 * recovered
+    np.testing.assert_array_equal(
+        result.measurements.columns()["recovered"], [False, False, False, bool(recovered)]
+    )
+    # What was doubted is kept apart for the figures.
+    assert len(result.outliers.columns()["time_s"]) == 4 * recovered
+
+
+def test_outliers_are_what_was_doubted(tmp_path: Path) -> None:
+    """Sigma 2.5 m; Hampel's kernel doubts three sigma and rejects twenty."""
+    far_log(tmp_path, [(1.0, 0.0), (2.0, 7.5), (3.0, 50.0)])
+    result = replay(LogFolder(tmp_path), settings_from(STANDING))
+    assert result.filter_name == "robust-ekf"
+    outliers = result.outliers.columns()
+    assert outliers["time_s"].tolist() == [2.0, 3.0]
+    assert outliers["outcome"].tolist() == ["downweighted", "rejected"]
+
+
+def test_alpha_is_that_of_the_settings(tmp_path: Path) -> None:
+    """Where the range is short its bend counts, and so does where the sigma points stand."""
+    standing_log(tmp_path, start_s=0.0, ranges=[(2.0, 9.0)])
+    found = []
+    for alpha in (1e-3, 1.0):
+        settings = settings_from({**STANDING, "filter": {"alpha": alpha}})
+        estimates = run(tmp_path, settings, "ukf")["estimates"]
+        ukf = RobustUkf(
+            [1.0, 2.0, 0.0],
+            np.diag([2.0, 2.0, 0.1]) ** 2,
+            process=Odometry(sigma_distance=0.0, sigma_drift=0.0, sigma_turn=0.0),
+            kernel="unit",
+            alpha=alpha,
+        )
+        for _ in range(2):
+            ukf.predict(1.0, [0, 0, 0])
+        ukf.update(9.0, LeaderRange(leader=(11.0, 2.0), sigma_range_m=1.5))
+        found.append(estimates["x_m"][-1])
+        assert found[-1] == pytest.approx(ukf.x[0], rel=1e-9)
+    assert abs(found[0] - found[1]) > 1e-5
+
+
+def test_leaders_know_their_places_unequally_well(tmp_path: Path) -> None:
+    """Sigmas of 0, 2 and 3.6 m beside 1.5 m: 1.5, 2.5 and 3.9 m."""
+    standing_log(tmp_path, start_s=0.0, ranges=[(1.0, 10.0)])
+    time_s = np.arange(1.0, 10.0)
+    write_file(tmp_path, "ranges.csv", time_s=time_s, source=[4, 3, 5] * 3, range_m=[10.0] * 9)
+    write_file(tmp_path, "leaders.csv", time_s=np.repeat([0.0, 10.0], 2), source=[4, 5] * 2,
+               x_m=[11.0] * 4, y_m=[2.0] * 4, sigma_m=[2.0, 3.6] * 2)  # fmt: skip
+    settings = settings_from({**SURE, "ranges": {"sigma_m": 1.5}, "log": {"leader_gap_s": 10.0}})
+    measured = run(tmp_path, settings, "ekf")["measurements"]
+    np.testing.assert_allclose(measured["sigma_0"], [2.5, 1.5, 3.9] * 3, rtol=1e-9)
+
+
+def test_start_csv_goes_before_the_truth(tmp_path: Path) -> None:
+    standing_log(tmp_path, start_s=2.0, ranges=[(3.0, 10.0)])
+    write_file(tmp_path, "truth.csv", time_s=[1.0], x_m=[5.0], y_m=[6.0], heading_rad=[0.5])
+    assert Localiser(LogFolder(tmp_path), Settings(), "ekf").start == (2.0, 1.0, 2.0, 0.0)
+
+
+def test_a_gap_is_as_long_as_the_steps_that_fill_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(engine, "_STEPS_WITHOUT_LINE", 10)
+    settings = settings_from({"odometry": {"max_step_s": 0.5}})
+    standing_log(tmp_path, start_s=0.0, ranges=[(5.0, 10.0), (10.0, 10.0)])
+    write_file(tmp_path, "odometry.csv", time_s=[0.0], speed_m_s=[0.0], yaw_rate_rad_s=[0.0])
+    assert outcomes(run(tmp_path, settings)) == ["accepted", "accepted"]
+    write_file(tmp_path, "ranges.csv", time_s=[5.0, 10.1], source=[3, 3], range_m=[10.0, 10.0])
+    with pytest.raises(LogError, match=r"no file has a line for 5\.1 s"):
+        run(tmp_path, settings)
+
+
 def test_late_ranges_give_the_same_as_ranges_in_time(tmp_path: Path) -> None:
     log = increments_log(tmp_path / "in_time")
     increments_log(tmp_path / "late")
@@ -405,6 +644,120 @@ def test_a_tracker_starts_at_the_first_fix_and_learns_the_velocity(tmp_path: Pat
     # The truth is asked for 0.1 s after each fix: the prediction goes on with the velocity.
     errors = tables["errors"]
     assert abs(errors["error_x_m"][-1]) < 0.01
+
+
+def far_fixes(
+    folder: Path, path: list[complex], time_s: list[float], *, start_s: float | None = None
+) -> None:
+    """Fixes of a craft on this path from a station far away along -x."""
+    seen = np.array(path) + FAR_M
+    write_file(folder, "fixes.csv", time_s=time_s, source=[0] * len(path), range_m=np.abs(seen),
+               bearing_rad=np.angle(seen))  # fmt: skip
+    write_file(folder, "beacons.csv", source=[0], x_m=[-FAR_M], y_m=[0.0])
+    if start_s is not None:
+        write_file(folder, "start.csv", time_s=[start_s], x_m=[path[0].real], y_m=[path[0].imag],
+                   heading_rad=[0.0])  # fmt: skip
+
+
+#: A filter that believes its fixes and is told nothing about the motion.
+BELIEVING = {
+    "start": {"sigma_position_m": 1.0, "sigma_speed_m_s": 10.0, "sigma_acceleration_m_s2": 10.0},
+    "fixes": {"sigma_range_m": 1e-4, "sigma_bearing_rad": 1e-4 / FAR_M, "near_field": 0.0},
+    "process": {"velocity_psd": 0.0, "acceleration_psd": 0.0},
+}
+
+
+@pytest.mark.parametrize("filter_name", ["ekf", "ukf", "aukf"])
+def test_a_trackers_first_fix_by_hand(tmp_path: Path, filter_name: Any) -> None:
+    """3 m, 1 m/s for 4 s and 0.5 m/s^2 for 4 s: 9 + 16 + 16 m^2; with 8 of the range 49."""
+    far_fixes(tmp_path, [0j], [4.0], start_s=0.0)
+    settings = settings_from(
+        {
+            "start": {
+                "sigma_position_m": 3.0,
+                "sigma_speed_m_s": 1.0,
+                "sigma_acceleration_m_s2": 0.5,
+            },
+            "fixes": {
+                "sigma_range_m": math.sqrt(8.0),
+                "sigma_bearing_rad": math.sqrt(23.0) / FAR_M,
+                "near_field": 0.0,
+            },
+            "process": {"velocity_psd": 0.0, "acceleration_psd": 0.0},
+        }
+    )
+    measured = run(tmp_path, settings, filter_name)["measurements"]
+    assert measured["outcome"].tolist() == ["accepted"]
+    assert measured["sigma_0"][0] == pytest.approx(7.0, rel=1e-6)
+    assert measured["sigma_1"][0] == pytest.approx(8.0 / FAR_M, rel=1e-6)
+    assert (measured["weight_0"][0], measured["weight_1"][0]) == (1.0, 1.0)
+
+
+def test_between_fixes_the_acceleration_goes_on(tmp_path: Path) -> None:
+    """2 m/s^2 along x: after fixes at 1, 2, 3 s it is known, and 3.5 s finds the craft there."""
+    time_s = [0.0, 1.0, 2.0, 3.0]
+    far_fixes(tmp_path, [complex(t * t, 0) for t in time_s], time_s, start_s=0.0)
+    write_file(tmp_path, "truth.csv", time_s=[3.5], x_m=[3.5**2], y_m=[0.0])
+    tables = run(tmp_path, settings_from(BELIEVING), "ekf")
+    assert tables["errors"]["error_x_m"][0] == pytest.approx(0.0, abs=0.01)
+    assert tables["errors"]["error_y_m"][0] == pytest.approx(0.0, abs=0.01)
+
+
+def test_a_tracker_is_scored_from_its_start_on(tmp_path: Path) -> None:
+    far_fixes(tmp_path, [0j, 0j], [1.0, 2.0])
+    write_file(tmp_path, "truth.csv", time_s=[0.5, 1.0, 1.5], x_m=[0.0] * 3, y_m=[0.0] * 3)
+    errors = run(tmp_path, settings_from(BELIEVING), "ukf")["errors"]
+    assert errors["time_s"].tolist() == [1.0, 1.5]
+
+
+def test_a_fix_that_is_due_is_taken_whatever_its_rounding(tmp_path: Path) -> None:
+    """0.4 - (0.1 + 0.2) is below 0.1 by a rounding."""
+    time_s = [0.1, 0.2, 0.1 + 0.2, 0.4, 0.5]
+    far_fixes(tmp_path, [0j] * 5, time_s)
+    settings = settings_from({**BELIEVING, "interval": {"policy": "fixed", "interval_s": 0.1}})
+    assert outcomes(run(tmp_path, settings, "aukf")) == ["accepted"] * 5
+    settings = settings_from({**BELIEVING, "interval": {"policy": "fixed", "interval_s": 0.101}})
+    assert outcomes(run(tmp_path, settings, "aukf"))[:3] == ["accepted", "held out", "accepted"]
+
+
+@pytest.mark.parametrize("filter_name", ["ukf", "robust-ukf", "ekf", "aukf"])
+def test_fixes_near_the_station_are_counted(tmp_path: Path, filter_name: Any) -> None:
+    """A craft at rest 2 m from the station, known to 1 m: within five of its sigmas."""
+    write_file(tmp_path, "fixes.csv", time_s=[1.0], source=[0], range_m=[2.0], bearing_rad=[0.0])
+    write_file(tmp_path, "beacons.csv", source=[0], x_m=[0.0], y_m=[0.0])
+    write_file(tmp_path, "start.csv", time_s=[0.0], x_m=[2.0], y_m=[0.0], heading_rad=[0.0])
+    result = replay(LogFolder(tmp_path), Settings(), filter_name=filter_name)
+    assert result.numbers["near_field"] == 1
+    far = settings_from({"fixes": {"near_field": 0.5}})
+    assert replay(LogFolder(tmp_path), far, filter_name=filter_name).numbers["near_field"] == 0
+
+
+def test_each_log_has_its_own_filter(tmp_path: Path) -> None:
+    far_fixes(tmp_path / "fixes", [0j], [1.0])
+    assert replay(LogFolder(tmp_path / "fixes"), Settings()).filter_name == "ukf"
+    far_log(tmp_path / "ranges", [(1.0, 0.0)])
+    assert replay(LogFolder(tmp_path / "ranges"), Settings()).filter_name == "robust-ekf"
+    chosen = settings_from({"filter": {"kind": "robust-ukf"}})
+    assert replay(LogFolder(tmp_path / "ranges"), chosen).filter_name == "robust-ukf"
+    result = replay(LogFolder(tmp_path / "ranges"), chosen, filter_name="ekf")
+    assert result.filter_name == "ekf"
+
+
+@pytest.mark.parametrize(
+    ("policy", "expected"),
+    [
+        ("fixed", FixedInterval(interval_s=4.0)),
+        (
+            "covariance-budget",
+            CovarianceBudget(initial_s=0.25, min_s=0.25, max_s=8.0, position_sigma_m=0.75),
+        ),
+        ("mahalanobis", MahalanobisInterval(initial_s=0.25, min_s=0.25, max_s=8.0)),
+    ],
+)
+def test_interval_policies_of_the_settings(policy: str, expected: object) -> None:
+    given = {"policy": policy, "interval_s": 4.0, "min_s": 0.25, "max_s": 8.0}
+    settings = settings_from({"interval": {**given, "position_sigma_m": 0.75}})
+    assert engine.interval_policy(settings.interval) == expected
 
 
 @pytest.mark.parametrize("filter_name", ["ukf", "aukf"])
@@ -532,6 +885,15 @@ def test_settings_refuse_by_name(tmp_path: Path, text: str, words: str) -> None:
 def test_settings_that_are_not_there(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="cannot be read"):
         find_settings(str(tmp_path / "none.toml"))
+
+
+def test_a_file_goes_before_packaged_settings_of_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert find_settings("goats14").ranges.sigma_m == 1.5
+    Path("goats14").write_text("[ranges]\nsigma_m = 7.0\n")
+    assert find_settings("goats14").ranges.sigma_m == 7.0
 
 
 def test_the_documented_settings_are_the_defaults(tmp_path: Path) -> None:
@@ -714,22 +1076,16 @@ def test_a_million_rows_take_no_more_memory_than_fewer(tmp_path: Path, million: 
 
 def test_ctrl_c_keeps_what_was_done(tmp_path: Path, million: Path) -> None:
     output = tmp_path / "out"
-    program = subprocess.Popen(
+    program = start_program(
         [sys.executable, "-m", "auvest", "replay", million, "--output", output, "--json"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
         env={**os.environ, "COLUMNS": "200"},
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )
     track = output / "million" / "trajectory.tum"
-    deadline = time.monotonic() + 60
-    while not (track.exists() and track.stat().st_size > 100_000):
-        assert time.monotonic() < deadline, "nothing was written in a minute"
-        assert program.poll() is None, program.communicate()
-        time.sleep(0.005)
+    wait_until(
+        lambda: track.exists() and track.stat().st_size > 100_000, "nothing was written", program
+    )
     program.send_signal(signal.SIGINT)
-    out, err = program.communicate(timeout=60)
+    out, err = program.communicate(timeout=PATIENCE_S)
     assert program.returncode == 130, err
     assert "interrupted in million: what was done is written" in " ".join(err.split())
     (result,) = json.loads(out)["logs"]

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from processes import PATIENCE_S
 
 from auvest.logs import LogFolder
 from auvest.logs.write import write_file
@@ -49,7 +50,7 @@ def opened(page: str, folder: Path) -> dict[str, Any]:
         "--virtual-time-budget=10000", "--dump-dom", path.as_uri(),
     ]  # fmt: skip
     done = subprocess.run(
-        command, capture_output=True, text=True, timeout=120, check=True,
+        command, capture_output=True, text=True, timeout=PATIENCE_S, check=True,
         env={**os.environ, "HOME": str(folder)},
     )  # fmt: skip
     seen = re.search(r'data-seen="([^"]*)"', done.stdout)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from result_support import tracking_result
 from typer.testing import CliRunner
 
 from auvest import Aukf, MahalanobisInterval
@@ -296,6 +298,93 @@ def test_the_filter_starts_as_its_track_does(track: TrackName) -> None:
     assert velocity == pytest.approx(filter_.x[2:4], abs=1e-4)
     assert acceleration == pytest.approx(filter_.x[4:], abs=1e-5)
     assert filter_.process.discretisation == ("euler" if track == "paper" else "exact")
+
+
+def test_the_figures_of_a_result_by_hand() -> None:
+    """Two runs with mean squares of (0 + 2) / 2 = 1 and (36 + 62) / 2 = 49 m^2."""
+    result = tracking_result([[[0, 0], [1, -1]], [[0, 6], [np.sqrt(62), 0]]])
+    assert aukf.square_per_run(result) == pytest.approx([1, 49])
+    assert aukf.square_per_run(result, 1) == pytest.approx([0.5, 18])
+    # The mean of 1 and 49 is 25 with a standard error of 24; that of the root is 24 / (2 * 5).
+    assert aukf.rmse(result) == aukf.Estimate(pytest.approx(5.0), pytest.approx(2.4))
+    assert aukf.rmse(result, 0).value == pytest.approx(np.sqrt((0.5 + 31) / 2))
+    one = aukf.rmse(tracking_result([[[3, 4]]]))
+    assert one.value == 5.0
+    assert np.isnan(one.standard_error)
+    # First step: 0 and 36; second: 2 and 62.
+    assert aukf.halves(result) == pytest.approx((np.sqrt(18), np.sqrt(32)))
+    # An odd number of steps: the one in the middle belongs to the second half.
+    assert aukf.halves(tracking_result([[[1, 0], [2, 0], [4, 0]]])) == pytest.approx(
+        (1, np.sqrt(10))
+    )
+    assert aukf.rms_per_step(result, 1) == pytest.approx([np.sqrt(18), np.sqrt(0.5)])
+    # At even times, between samples too: 8 / 2 and 50 / 1, a mean of 27 with an error of 23.
+    probed = tracking_result(
+        [[[0, 0]], [[0, 0]]],
+        probe_square_sum=np.array([8.0, 50.0]),
+        probe_count=np.array([2.0, 1.0]),
+    )
+    over_time = aukf.rmse_over_time(probed)
+    assert over_time.value == pytest.approx(np.sqrt(27))
+    assert over_time.standard_error == pytest.approx(23 / (2 * np.sqrt(27)))
+
+
+def test_an_excess_is_that_of_paired_runs() -> None:
+    """RMSE of 2 m over 1 m: an excess of 1, without any doubt if every run has that ratio."""
+    a = tracking_result([[[2, 0]], [[4, 0]], [[6, 0]]])
+    b = tracking_result([[[1, 0]], [[2, 0]], [[3, 0]]])
+    assert aukf.excess(a, b) == aukf.Estimate(pytest.approx(1.0), pytest.approx(0.0, abs=1e-12))
+    # Mean squares of a 4 and 28, of b 4 and 4: the ratio of the means is 4. Left over are 4 - 16
+    # and 28 - 16, whose mean has a standard error of 12, 3 in units of b's 4; that of the root is
+    # 3 / (2 * 2).
+    a, b = tracking_result([[[2, 0]], [[np.sqrt(28), 0]]]), tracking_result([[[0, 2]], [[0, 2]]])
+    assert aukf.excess(a, b) == aukf.Estimate(pytest.approx(1.0), pytest.approx(0.75))
+    one = aukf.excess(tracking_result([[[3, 0]]]), tracking_result([[[2, 0]]]))
+    assert one.value == pytest.approx(0.5)
+    assert np.isnan(one.standard_error)
+
+
+def test_a_run_has_collapsed_if_its_last_five_intervals_are_short() -> None:
+    limit = aukf.COLLAPSED_S
+    last_long = [1.0] * 6 + [0.0] * 4 + [5.1 * limit]
+    last_short = [1.0] * 6 + [0.0] * 4 + [4.9 * limit]
+    assert aukf.collapsed(np.array([last_long, last_short, last_short, last_long])) == 0.5
+
+
+def test_intervals_are_those_that_led_to_each_sample() -> None:
+    result = tracking_result(np.zeros((1, 3, 2)), time_s=np.array([[0.5, 0.75, 1.75]]))
+    assert aukf.intervals(result).tolist() == [[0.5, 0.25, 1.0]]
+
+
+def test_roughness_is_the_second_difference_of_the_error() -> None:
+    """A steady drift is smooth; 0, 3, 0 along x and 0, 4, 0 along y bend by 6 and by 8: 10."""
+    drift = [[k, -2 * k] for k in range(5)]
+    assert aukf.roughness(tracking_result([drift])) == pytest.approx(0.0, abs=1e-12)
+    assert aukf.roughness(tracking_result([[[0, 0], [3, 4], [0, 0]]])) == pytest.approx(10.0)
+
+
+def test_the_ratio_before_its_clamp_is_equation_7() -> None:
+    """Desired steps of 1 m, estimated ones of 3 m, gamma1 = 1: M = 1 / (9 + 1)."""
+    result = tracking_result([[[0, 0], [2, 0], [4, 0]]])
+    desired = np.array([[[0, 0], [1.0, 0], [2, 0]]])
+    result = replace(result, truth=desired, x=result.x + np.pad(desired, ((0, 0), (0, 0), (0, 4))))
+    assert aukf.raw_ratio(result, 1.0) == pytest.approx(np.array([[0.1, 0.1]]))
+
+
+def test_what_the_interval_reacts_to_is_found() -> None:
+    """Intervals made of the error of the sample before, and a tau made of its growth."""
+    random = np.random.default_rng(1)
+    runs, steps = 50, 40
+    size = np.exp(random.standard_normal((runs, steps)))
+    # The interval after sample k leads to sample k + 1.
+    pace = np.concatenate([np.full((runs, 1), 0.5), 3.0 + size[:, :-1]], axis=1)
+    tau = np.full((runs, steps), 0.5)
+    tau[:, 1:] -= 0.01 * np.log(size[:, 1:] / size[:, :-1])
+    error = np.stack([0 * size, size], axis=-1)
+    found = aukf.reaction(tracking_result(error, time_s=np.cumsum(pace, axis=1), tau=tau))
+    assert found.error == pytest.approx(1.0)
+    assert abs(found.previous) < 0.15  # 50 * 24 pairs of independent deviates
+    assert found.growth == pytest.approx(-1.0)
 
 
 def test_failed_runs_end_with_exit_code_1(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

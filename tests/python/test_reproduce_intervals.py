@@ -1,10 +1,13 @@
 """The comparison of interval policies: its judgement, its page, and that the page is not stale."""
 
 import json
+import math
 import re
 
+import numpy as np
 import pytest
 from conftest import ROOT
+from result_support import tracking_result
 from typer.testing import CliRunner
 
 from auvest.cli import app
@@ -34,6 +37,75 @@ def case(budget, fixed, law):
 )
 def test_what_dominates_means(budget, fixed, law, dominates):
     assert case(figures(*budget), figures(*fixed), figures(*law)).dominates is dominates
+
+
+def test_clearly_less_is_two_standard_errors():
+    """Standard errors of 3 % and 4 % are 5 % together: 10 % apart is not enough, 10.1 % is."""
+
+    def with_errors(fixed, law):
+        budget = intervals.Figures(0.5, 0.1, 0.1, 0.03, 0)
+        rivals = [intervals.Figures(0.5, 0.1, above, 0.04, 0) for above in (fixed, law)]
+        return case(budget, *rivals)
+
+    assert with_errors(0.201, 0.201).clearly_less
+    assert not with_errors(0.199, 0.201).clearly_less
+    assert not with_errors(0.201, 0.199).clearly_less
+
+
+def test_the_rmse_is_compared_with_the_best():
+    one = case(figures(0.3, 0.01), figures(0.2, 0.02), figures(0.25, 0.02))
+    assert one.rmse_ratio == pytest.approx(1.5)
+    assert case(figures(0.1, 0.01), figures(0.2, 0.02), figures(0.3, 0.02)).rmse_ratio == 1.0
+
+
+def test_the_figures_of_a_policy_by_hand():
+    """Two runs: 1 and 3 of 10 probes above; 10 m^2 in 20 probes; 24 s in 8 samples."""
+    result = tracking_result(
+        np.zeros((2, 5, 2)),
+        time_s=np.array([[2.0, 4.0, 6.0, 8.0, 10.0], [5.0, 10.0, 14.0, np.nan, np.nan]]),
+        samples=np.array([5, 3]),
+        status=np.array([0, 1]),
+        probe_square_sum=np.array([4.0, 6.0]),
+        probe_above=np.array([1.0, 3.0]),
+        probe_count=np.array([10.0, 10.0]),
+    )
+    got = intervals._figures(result)
+    assert got.interval_s == pytest.approx(3.0)
+    assert got.rmse_m == pytest.approx(math.sqrt(0.5))
+    assert got.above == pytest.approx(0.2)
+    assert got.above_error == pytest.approx(0.1)  # of 0.1 and 0.3: their distance by two
+    assert got.failed == 1
+
+
+def test_summary_and_page_say_what_the_cases_are():
+    def point(noise, budget, fixed, law, interval_s=0.4):
+        policies = {
+            name: intervals.Figures(interval_s, rmse_m, above, 0.01, failed)
+            for (rmse_m, above), failed, name in zip(
+                (budget, fixed, law, law), range(4), intervals.POLICIES, strict=True
+            )
+        }
+        return intervals.Case("far, straight", noise, 0.45, policies)
+
+    good = point("normal", (0.1, 0.02), (0.12, 0.08), (0.13, 0.09))
+    close = point("uniform", (0.1, 0.02), (0.12, 0.03), (0.13, 0.09))
+    bad = point("lognormal", (0.15, 0.04), (0.12, 0.03), (0.13, 0.04))
+    cases = intervals.summary([good, close, bad], runs=7, seed=9)["cases"]
+    assert [c["dominates"] for c in cases] == [True, True, False]
+    assert [c["less_time_above"] for c in cases] == [True, True, False]
+    assert cases[2]["rmse_over_best"] == pytest.approx(1.25)
+    for c in cases:
+        assert c["error_budget_m"] == pytest.approx(0.9)  # two sigma
+        for failed, name in enumerate(intervals.POLICIES):
+            assert c[name]["samples_per_s"] == pytest.approx(2.5)
+            assert c[name]["failed_runs"] == failed
+    words = " ".join(intervals.page([good, close, bad], runs=7, seed=9).split())
+    assert "in 2 of 3 points, in 2 of the 2 with normal or uniform noise" in words
+    assert "has less time above in 2 of 3." in words
+    # 6 % is more than two standard errors of 1.4 %, 1 % is not.
+    assert "Of the 2 points, 1 have less time above by more than two standard errors" in words
+    assert "the other points: far, straight (1)." in words
+    assert "no: RMSE +25.0 %, time above 4.0 against 3.0 %, time above 4.0 against 4.0 %" in words
 
 
 @pytest.fixture(scope="module")

@@ -106,6 +106,62 @@ def test_rmse_by_hand():
     assert figures.relative_tracks_m == pytest.approx(math.sqrt(2) / 2)
 
 
+def figures(slave_m, relative_m):
+    """RMSE of a run; those of the tracks are half of it."""
+    return mrclam6.Figures(slave_m, relative_m, slave_m / 2, relative_m / 2)
+
+
+def track(seconds, sightings):
+    none = np.zeros((sightings - 1, 2))
+    return mrclam6.Track(
+        1, 2, np.array([5.0, 5.0 + seconds]), np.zeros((1, 2)), none[:, 0], none, np.zeros(2),
+        np.zeros((2, 3)), np.zeros((2, 2)),
+    )  # fmt: skip
+
+
+def judged(ekf_slat, slatf2):
+    """Dead reckoning has 2 m; the filter of one model is not asked anything."""
+    runs = {
+        "dead_reckoning": [figures(2.0, math.nan)],
+        "ekf_slat_one_model": [figures(9.0, 9.0)],
+        "ekf_slat": [figures(*one) for one in ekf_slat],
+        "slatf2": [figures(*one) for one in slatf2],
+    }
+    tracks = [track(10.0, 4), track(2.5, 3)]
+    return mrclam6.summary(tracks, runs, (0.25, 0.5), seed=3)
+
+
+def test_summary_by_hand():
+    result = judged([(2.1, 0.36)], [(1.0, 0.3), (2.2, 0.2), (1.6, 0.4), (2.0, 0.3)])
+    assert (result["tracks"], result["seconds"], result["sightings"]) == (2, 12.5, 7)
+    assert (result["drift_speed_density"], result["drift_yaw_rate_density"]) == (0.25, 0.5)
+    *_, ekf, row = result["filters"]
+    # Limits: 1.05 times 2 m and 0.36 m; what is just as good is within them.
+    assert ekf["runs_within_targets"] == 1
+    assert row["runs"] == 4
+    assert row["slave_rmse_m"] == pytest.approx(1.7)
+    assert (row["ratio"], row["ratio_worst"]) == pytest.approx((0.85, 1.1))
+    assert (row["relative_rmse_m"], row["relative_rmse_worst_m"]) == pytest.approx((0.3, 0.4))
+    assert row["runs_within_targets"] == 2  # the second is off in the slave, the third in the pair
+    assert row["ratio_of_track_means"] == pytest.approx(0.85)
+    assert row["relative_track_mean_m"] == pytest.approx(0.15)
+
+
+@pytest.mark.parametrize(
+    ("ekf_slat", "slatf2", "met"),
+    [
+        ([(2.1, 0.36)], [(2.0, 0.3)], True),
+        ([(2.2, 0.3)], [(2.0, 0.3)], False),
+        ([(2.0, 0.37)], [(2.0, 0.3)], False),
+        ([(2.0, 0.3)], [(2.2, 0.3)], False),
+        ([(2.0, 0.3)], [(2.0, 0.37)], False),
+        ([(2.0, 0.3)], [(1.9, 0.3), (2.2, 0.4)], True),  # their means are 2.05 and 0.35
+    ],
+)
+def test_both_filters_must_meet_both_targets(ekf_slat, slatf2, met):
+    assert judged(ekf_slat, slatf2)["met"] is met
+
+
 def test_command_on_a_made_up_recording(folder, tmp_path):
     arguments = ["reproduce", "mrclam6", "--data", str(folder), "--runs", "1", "--json", "--quiet"]
     output = tmp_path / "out"

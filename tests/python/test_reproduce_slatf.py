@@ -7,14 +7,14 @@ import json
 import math
 import re
 import signal
-import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from processes import PATIENCE_S, start_program, wait_until
+from result_support import slat_result
 from typer.testing import CliRunner, Result
 
 from auvest.cli import app
@@ -195,6 +195,27 @@ def test_workers_and_progress(small: slatf.Reproduction) -> None:
     assert [done for done, _ in calls] == sorted(done for done, _ in calls)
 
 
+def test_the_figures_of_a_result_by_hand() -> None:
+    """Distances of 5 and 1 m in one run, 7 and 7 m in the other."""
+    result = slat_result([[[3, -4], [0, 1]], [[7, 0], [0, -7]]])
+    roots = (math.sqrt(13), 7.0)
+    rmse = slatf.rmse(result)
+    assert rmse.value == pytest.approx(sum(roots) / 2)
+    assert rmse.standard_error == pytest.approx((7 - math.sqrt(13)) / 2)  # |a - b| / 2 of two
+    assert slatf.mean_error(result) == 5.0
+    assert slatf.error_variance(result) == 6.0  # (0 + 16 + 4 + 4) / 4
+    assert slatf.rms_per_ping(result) == pytest.approx([math.sqrt(37), 5.0])
+
+
+def test_a_difference_is_that_of_paired_runs() -> None:
+    """Of 5 and 8 m against 4 and 5 m: 1 and 3 m, 2 m with a standard error of 1 m."""
+    a, b = slat_result([[[3, 4]], [[0, 8]]]), slat_result([[[4, 0]], [[0, 5]]])
+    assert slatf.difference(a, b) == slatf.Estimate(pytest.approx(2.0), pytest.approx(1.0))
+    one = slatf.difference(slat_result([[[3, 4]]]), slat_result([[[0, 1]]]))
+    assert one.value == pytest.approx(4.0)
+    assert math.isnan(one.standard_error)
+
+
 def test_one_run_is_enough_for_a_page(tmp_path: Path) -> None:
     result = call(
         "reproduce", "slatf", "--runs", "1", "--particles", "10", "--output", str(tmp_path)
@@ -345,21 +366,11 @@ def test_ctrl_c_keeps_runs_and_the_same_command_goes_on(tmp_path: Path) -> None:
     options = ["--runs", "300", "--particles", "400", "--no-figure", "--workers", "2"]
     command = [sys.executable, "-m", "auvest", "simulate", "slatf", *options]
     command += ["--output", str(tmp_path / "out")]
-    with subprocess.Popen(
-        command,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        # A shell that runs the tests in the background has them ignore the signal.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    ) as program:
-        deadline = time.monotonic() + 60
-        while time.monotonic() < deadline and program.poll() is None:
-            if len(list((tmp_path / "out" / ".runs").glob("*.npz"))) >= 3:
-                break
-            time.sleep(0.01)
+    with start_program(command) as program:
+        runs = tmp_path / "out" / ".runs"
+        wait_until(lambda: len(list(runs.glob("*.npz"))) >= 3, "three chunks are kept", program)
         program.send_signal(signal.SIGINT)
-        out, err = program.communicate(timeout=60)
+        out, err = program.communicate(timeout=PATIENCE_S)
     assert program.returncode == 130, err
     assert "are done and kept; the same command goes on from there" in plain(err)
     assert "SLATF 2.0" in plain(out)

@@ -229,6 +229,9 @@ def test_a_million_steps_through_the_station(alpha):
 
 # ---- Threads.
 
+#: A busy machine may keep a second thread from running beside the first, but not so often.
+TRIES = 20
+
 
 def test_run_releases_the_gil():
     f = make(auvest.Ukf, "float32")
@@ -243,8 +246,10 @@ def test_run_releases_the_gil():
     thread = threading.Thread(target=tick)
     thread.start()
     try:
-        longest = []
-        for _ in range(3):  # a busy machine may keep the other thread waiting for once
+        longest = [1.0]
+        for _ in range(TRIES):
+            if longest[-1] < 0.5:
+                break
             ticks.clear()
             start = time.perf_counter()
             f.run(z, dt=1e-3)
@@ -255,7 +260,7 @@ def test_run_releases_the_gil():
         stop.set()
         thread.join()
     # With the GIL held the only long gap would be nearly all of the time.
-    assert min(longest) < 0.5
+    assert longest[-1] < 0.5
 
 
 def test_threads_with_a_filter_each_agree():
@@ -271,17 +276,20 @@ def test_threads_with_a_filter_each_agree():
 
 
 def test_a_filter_in_use_refuses_a_second_thread():
-    f = make(auvest.Ukf, "float32")
     z = measure(straight(500_000, velocity=(1e-4, 1e-4)))
     expected = make(auvest.Ukf, "float32").run(z, dt=1e-3)
     refused = 0
     with ThreadPoolExecutor(1) as pool:
-        future = pool.submit(f.run, z, dt=1e-3)
-        while not future.done():
-            time.sleep(0.002)
-            try:
-                f.predict(0.0)
-            except RuntimeError as error:
-                refused += "in use by another thread" in str(error)
+        for _ in range(TRIES):
+            f = make(auvest.Ukf, "float32")
+            future = pool.submit(f.run, z, dt=1e-3)
+            while not future.done():
+                time.sleep(0.002)
+                try:
+                    f.predict(0.0)
+                except RuntimeError as error:
+                    refused += "in use by another thread" in str(error)
+            assert same_bits(future.result().x[-1], expected.x[-1])
+            if refused > 0:
+                break
     assert refused > 0
-    assert same_bits(future.result().x[-1], expected.x[-1])

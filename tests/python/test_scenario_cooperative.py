@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from result_support import cooperative_result
 
 import auvest
 from auvest.scenarios import cooperative
@@ -25,7 +26,8 @@ def test_same_seed_same_numbers_whatever_the_workers():
     scenario = Scenario(**SHORT, late=0.3, dropout=0.1, timing="own-time")
     a = simulate(slave_filter(), scenario, workers=1)
     b = simulate(slave_filter(), scenario, workers=5)
-    for name in ("error", "covariance", "nis", "weight", "samples", "status"):
+    names = ("error", "covariance", "nis", "weight", "samples", "status")
+    for name in (*names, "taken", "too_late", "lost", "overflowed"):
         assert np.array_equal(getattr(a, name), getattr(b, name), equal_nan=True), name
     c = simulate(slave_filter(), Scenario(**SHORT, late=0.3, dropout=0.1, seed=2))
     assert not np.array_equal(a.error, c.error)
@@ -83,6 +85,31 @@ def test_late_and_lost_messages_cost_information_not_consistency():
         assert not result.too_late.any()
 
 
+def test_messages_that_are_not_taken_are_counted():
+    def counts(**options):
+        scenario = Scenario(runs=3, steps=1000, timing="own-time", **options)
+        result = simulate(slave_filter("unit"), scenario)
+        assert result.too_late.tolist() == [0, 0, 0]
+        return result.taken, result.lost, result.overflowed
+
+    # Each is complete two ranges after it was measured: all but the last two of 200 arrive.
+    taken, lost, overflowed = counts()
+    assert (taken.tolist(), lost.tolist(), overflowed.tolist()) == ([198] * 3, [0] * 3, [0] * 3)
+
+    taken, lost, overflowed = counts(dropout=1.0)
+    assert (taken.tolist(), lost.tolist(), overflowed.tolist()) == ([0] * 3, [200] * 3, [0] * 3)
+
+    # A range each second that takes 3 to 22 s: up to eight are on their way, at the end too, and
+    # Little's law says how many arrive: 8 of them, 12.5 s each, where there are always eight.
+    assert cooperative.MESSAGES_IN_FLIGHT == 8
+    taken, lost, overflowed = counts(range_every=1, late=1.0, late_steps=20)
+    assert not lost.any()
+    left = 1000 - taken - overflowed
+    assert ((left >= 0) & (left <= 8)).all()
+    assert np.all(taken < 1000 * 8 / 12.5)
+    assert np.all(taken > 1000 * 7 / 12.5)
+
+
 @pytest.mark.parametrize(
     "noise",
     [
@@ -111,6 +138,35 @@ def test_float32_runs_too():
     result = simulate(slave_filter(dtype="float32"), Scenario(**SHORT))
     wanted = simulate(slave_filter(), Scenario(**SHORT))
     assert result.rmse_m == pytest.approx(wanted.rmse_m, rel=1e-2)
+
+
+def test_the_figures_of_a_result_by_hand():
+    """Mean squares of two runs: (0 + 2) / 2 = 1 and (36 + 62) / 2 = 49."""
+    a = [[[0.0, 0.0], [1.0, -1.0]], [[0.0, 6.0], [math.sqrt(62), 0.0]]]
+    result = cooperative_result(a)
+    assert result.rmse_per_run_m == pytest.approx([1.0, 7.0])
+    assert result.rmse_m == pytest.approx(5.0)  # of 25
+    # The mean square has the standard error |1 - 49| / 2 = 24; d sqrt(m) = dm / (2 sqrt(m)).
+    assert result.rmse_standard_error_m == pytest.approx(2.4)
+    assert math.isnan(cooperative_result(a[:1]).rmse_standard_error_m)
+    # Rows after the end of a run do not count.
+    result = cooperative_result([[[3.0, 4.0], [np.nan, np.nan]], [[0.0, 0.0], [0.0, 1.0]]])
+    assert result.rmse_per_run_m == pytest.approx([5.0, math.sqrt(0.5)])
+    assert result.rmse_m == pytest.approx(math.sqrt(26 / 3))
+    # e' P^-1 e with P = diag(4, 9).
+    spread = np.broadcast_to(np.diag([4.0, 9.0]), (1, 1, 2, 2))
+    result = cooperative_result([[[2.0, 6.0]]], covariance=spread)
+    assert result.nees == pytest.approx(1 + 4)
+
+
+def test_factors_are_of_variances():
+    plain = slave_filter()
+    wide = slave_filter(q_factor=4.0, r_factor=9.0)
+    assert plain.measurement.sigma_range_m == 1.0
+    assert wide.measurement.sigma_range_m == 3.0
+    assert slave_filter(r_factor=0.25, sigma_range_m=3.0).measurement.sigma_range_m == 1.5
+    for name in ("sigma_forward", "sigma_heading"):
+        assert getattr(wide.process, name) == 2 * getattr(plain.process, name) > 0
 
 
 def test_what_a_simulation_cannot_take_is_refused():

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from result_support import slat_result
 
 from auvest import (
     CompassMotion,
@@ -18,6 +19,7 @@ from auvest import (
     Sonar,
     UnicycleMotion,
 )
+from auvest.scenarios import slat
 from auvest.scenarios.paper_slatf import FILTERS, LEVELS, paper_filter, paper_scenario
 from auvest.scenarios.slat import SlatScenario, Vehicle, paper_masters, simulate
 
@@ -124,6 +126,66 @@ def test_rmse_is_the_mean_over_runs_of_the_root_over_time() -> None:
     assert result.rmse_standard_error_m == pytest.approx(np.std(per_run, ddof=1) / np.sqrt(7))
     solved = np.linalg.solve(result.covariance, result.error[..., None])[..., 0]
     assert result.nees == pytest.approx((result.error * solved).sum(axis=-1), rel=1e-6)
+
+
+def test_the_figures_of_a_result_by_hand() -> None:
+    """Squares of 25 and 1 in one run; 49, and nothing after a failure, in the other."""
+    nan = np.nan
+    error = [[[3, -4], [0, 1]], [[7, 0], [nan, nan]]]
+    result = slat_result(error, status=np.array([0, 3]))
+    assert result.failed.tolist() == [False, True]
+    assert result.run_rmse_m == pytest.approx([np.sqrt(13), 7.0])
+    assert result.rmse_m == pytest.approx((np.sqrt(13) + 7) / 2)
+    # 95 % of a chi-square value with 2 degrees of freedom is below -2 ln 0.05 = 5.99.
+    assert result.covered == pytest.approx(1 / 3)
+    p = np.array([[4.0, 1.0], [1.0, 1.0]])  # its inverse is [[1, -1], [-1, 4]] / 3
+    wide = slat_result(error, covariance=np.broadcast_to(p, (2, 2, 2, 2)))
+    assert wide.nees[0] == pytest.approx([(9 + 2 * 12 + 4 * 16) / 3, 4 / 3])
+    assert wide.covered == pytest.approx(1 / 3)
+    # Particles in one place claim to be certain.
+    certain = slat_result(error, covariance=np.zeros((2, 2, 2, 2)))
+    assert certain.nees[0].tolist() == [np.inf, np.inf]
+    assert certain.covered == 0.0
+    assert np.isnan(slat_result(error[:1]).rmse_standard_error_m)
+
+
+@pytest.mark.parametrize(
+    ("duration_s", "odometry_s", "odometry_per_ping", "pings"),
+    [
+        (400, 1, 2, 200),
+        (0.3, 0.1, 1, 3),  # 0.3 / 0.1 is below 3 by a rounding
+        (5, 1, 2, 2),
+        (1.6, 1, 2, 1),
+    ],
+)
+def test_pings_of_a_run(
+    duration_s: float, odometry_s: float, odometry_per_ping: int, pings: int
+) -> None:
+    scenario = SlatScenario(
+        duration_s=duration_s, odometry_s=odometry_s, odometry_per_ping=odometry_per_ping, runs=2
+    )
+    assert scenario.pings == pings
+    result = simulate(DeadReckoning(START, CERTAIN), scenario)
+    assert result.error.shape == (2, pings, 2)
+
+
+def test_limits_of_a_scenario() -> None:
+    runs = slat.MAX_PINGS // 2
+    assert SlatScenario(duration_s=4, runs=runs).runs == runs
+    with pytest.raises(ValueError, match="duration_s gives 2 pings per run"):
+        SlatScenario(duration_s=4, runs=runs + 1)
+    sure = SlatScenario(dropout=1, outlier=1)
+    assert (sure.dropout, sure.outlier) == (1.0, 1.0)
+
+
+def test_a_scenario_tells_the_filter_its_noise() -> None:
+    scenario = SlatScenario(
+        sigma_speed_mps=0.5, sigma_heading_rad=0.25, sigma_range_m=3.0, sigma_bearing_rad=0.125
+    )
+    motion, sonar = scenario.motion, scenario.sonar
+    assert (motion.sigma_speed_mps, motion.sigma_heading_rad) == (0.5, 0.25)
+    assert motion.compensate_bias
+    assert (sonar.sigma_range_m, sonar.sigma_bearing_rad) == (3.0, 0.125)
 
 
 @pytest.mark.parametrize(

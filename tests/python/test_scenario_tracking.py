@@ -8,6 +8,7 @@ import threading
 import numpy as np
 import pytest
 from filter_support import PAPER, everything, same_bits
+from result_support import tracking_result
 
 import auvest
 from auvest.scenarios import tracking
@@ -341,6 +342,44 @@ BAD = [
 def test_bad_input(call, error, message):
     with pytest.raises(error, match=message):
         call()
+
+
+def test_as_many_samples_as_there_is_room_for():
+    runs = tracking.MAX_SAMPLES // 1000
+    assert Scenario(runs=runs, steps=1000).runs == runs
+    with pytest.raises(ValueError, match=r"runs \* steps must be at most 10000000"):
+        Scenario(runs=runs + 1, steps=1000)
+
+
+def test_probes_are_off_or_a_tenth_of_a_millisecond_apart():
+    assert Scenario(probe_period_s=0.0).probe_period_s == 0.0
+    assert Scenario(probe_period_s=1e-4).probe_period_s == 1e-4
+    with pytest.raises(ValueError, match="probe_period_s must be 0 or at least 1e-4"):
+        Scenario(probe_period_s=0.99e-4)
+
+
+def test_the_figures_of_a_result_by_hand():
+    """Runs that end after 3 and after 2 samples, at 3 and at 5 s; squares of 25, 0, 0 and 1, 4."""
+    nan = np.nan
+    result = tracking_result(
+        [[[3, -4], [0, 0], [0, 0]], [[0, 1], [2, 0], [nan, nan]]],
+        time_s=np.array([[1.0, 2.0, 3.0], [1.0, 5.0, nan]]),
+        samples=np.array([3, 2]),
+        status=np.array([0, 4]),
+        position_covariance=np.broadcast_to(np.diag([4.0, 16.0]), (2, 3, 2, 2)),
+        probe_square_sum=np.array([8.0, 10.0]),
+        probe_above=np.array([1.0, 3.0]),
+        probe_count=np.array([2.0, 6.0]),
+    )
+    assert result.failed.tolist() == [False, True]
+    assert result.rmse_m == pytest.approx(np.sqrt(30 / 5))
+    assert result.mean_interval_s == pytest.approx(8 / 5)
+    assert result.nees[:, 0] == pytest.approx([9 / 4 + 16 / 16, 1 / 16])
+    assert result.rmse_over_time_m == pytest.approx(np.sqrt(18 / 8))
+    assert result.time_above_budget == pytest.approx(4 / 8)
+    unprobed = tracking_result(np.zeros((2, 3, 2)), samples=np.zeros(2, int))
+    for figure in ("rmse_over_time_m", "time_above_budget", "mean_interval_s"):
+        assert np.isnan(getattr(unprobed, figure))
 
 
 def test_start_is_the_state_that_the_track_leaves_with():

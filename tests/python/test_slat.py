@@ -24,7 +24,7 @@ from auvest import (
     Status,
     UnicycleMotion,
 )
-from auvest.slat import SlatFilter, available_lanes
+from auvest.slat import MAX_MASTERS, SlatFilter, available_lanes
 
 Floats = npt.NDArray[np.float64]
 
@@ -369,6 +369,34 @@ def test_outage_starts_the_filter_from_the_shared_state() -> None:
         outage.master(0)
 
 
+def test_outage_refuses_a_state_that_is_none() -> None:
+    outage = Outage(fresh())
+    outage.share([1, 2], np.eye(2))
+
+    def shared(p: Any, master_p: Any = MASTER_P) -> Callable[[], None]:
+        return lambda: outage.share([3, 4], p, [(MASTER_X, master_p)])
+
+    skew = MASTER_P.copy()
+    skew[0, 2] = 0.01
+    for call, message in (
+        (shared([[1.0, 0.5], [0.0, 1.0]]), "^P must be symmetric"),
+        (shared([[1.0, 0.0], [0.5, 1.0]]), "^P must be symmetric"),
+        (shared([[1.0, 2.0], [2.0, 1.0]]), "^P must not have negative eigenvalues, it has -1"),
+        (shared(CERTAIN, skew), r"^masters\[0\]\[1\] must be symmetric"),
+        (shared(CERTAIN, 0 * MASTER_P), r"^masters\[0\]\[1\] must be positive definite"),
+        (
+            lambda: outage.share([3, 4], CERTAIN, [(MASTER_X, MASTER_P)] * 5),
+            "masters has 5 elements, at most 4",
+        ),
+    ):
+        with pytest.raises(ValueError, match=message):
+            call()
+    assert outage.x.tolist() == [1, 2]  # nothing has changed
+    outage.share([3, 4], [[1.0, 0.5], [0.5, 1.0]], [(MASTER_X, MASTER_P)] * 4)
+    assert outage.x.tolist() == [3, 4]
+    assert np.array_equal(outage.P, [[1.0, 0.5], [0.5, 1.0]])
+
+
 def test_outage_of_dead_reckoning_equals_it() -> None:
     outage = Outage(DeadReckoning(START, CERTAIN))
     outage.share([3, 4], np.eye(2), [(MASTER_X, MASTER_P)])
@@ -517,6 +545,25 @@ def test_no_more_masters_than_there_is_room_for() -> None:
         assert filter_.add_master(MASTER_X, MASTER_P) == number
     with pytest.raises(ValueError, match="the filter has 4 masters already"):
         filter_.add_master(MASTER_X, MASTER_P)
+
+
+def test_an_echo_of_each_master_at_once_and_no_more() -> None:
+    filter_ = EkfSlat(START, CERTAIN, gate=16.0)
+    places = [(100.0, 0.0), (0.0, 200.0), (-300.0, 0.0), (0.0, -400.0)]
+    assert len(places) == MAX_MASTERS
+    for x, y in places:
+        filter_.add_master([x, y, 0, 0, 0, 0], MASTER_P)
+    filter_.predict(1, [0, 0])
+    # From the master to the slave at the origin: back along the line.
+    z = [[np.hypot(x, y), np.arctan2(-y, -x)] for x, y in places]
+    filter_.update(z, [0, 1, 2, 3])
+    assert filter_.nis == pytest.approx(0.0, abs=1e-9)  # each is what was expected
+    assert filter_.P.diagonal().max() < 9.0  # and all were heard: dead reckoning has 2 m/s
+    before = filter_.x, filter_.P
+    with pytest.raises(ValueError, match="z has 5 echoes; at most 4 are taken at once"):
+        filter_.update([*z, [50.0, 1.0]], [0, 1, 2, 3, UNKNOWN_MASTER])
+    assert np.array_equal(filter_.x, before[0])
+    assert np.array_equal(filter_.P, before[1])
 
 
 def test_missing_echoes_change_nothing() -> None:

@@ -334,9 +334,9 @@ class GaussianFilter:
         sensor : str or MeasurementModel, optional
             What measured: one of ``sensors`` by name, or any other model; needed where the filter
             has several.
-        place : array_like, shape (2,), optional
-            Where the sensor's station, or the leader that it ranges to, stood, m; default: where
-            the model has it.
+        place : array_like, optional
+            What ``sensor.place`` names, then: where the station or the leader stood, m, how the
+            instrument was headed, rad; default: as the model has it.
         age_s : float, optional
             How long ago it was measured, s, at most ``late_s``; default: now.
 
@@ -423,9 +423,9 @@ class GaussianFilter:
         sensor : str or MeasurementModel, or sequence of str, length T
             What measured: one for all rows, or one of ``sensors`` per row; needed where the filter
             has several.
-        place : array_like, shape (T, 2), optional
-            Where the sensor's station, or the leader, stood at each row, m; a NaN row, and default:
-            where the model has it.
+        place : array_like, shape (T, p), optional
+            What ``sensor.place`` names, at each row: where the station or the leader stood, m, how
+            the instrument was headed, rad; a NaN row, and default: as the model has it.
         age_s : float or array_like, shape (T,), optional
             How long before each row its measurement was taken, s. One older than ``late_s`` is left
             out and marked in the column ``too_late``.
@@ -692,8 +692,9 @@ class GaussianFilter:
 
     def _as_place(self, place: npt.ArrayLike, handle: _Sensor[Any]) -> Floats:
         if handle.place == 0:
-            raise TypeError("place must be None: this sensor stands nowhere")
-        return as_array("place", place, (handle.place,), self._dtype)
+            raise TypeError("place must be None: the place of this sensor is no part of its model")
+        given = np.atleast_1d(place) if handle.place == 1 else place  # type: ignore[arg-type]
+        return as_array("place", given, (handle.place,), self._dtype)
 
     def _as_places(
         self,
@@ -706,7 +707,9 @@ class GaussianFilter:
             return None
         sizes = np.array([handle.place for handle in handles])
         if sizes.max() == 0:
-            raise TypeError("place must be None: this sensor stands nowhere")
+            raise TypeError("place must be None: the place of this sensor is no part of its model")
+        if sizes.max() == 1 and np.ndim(place) == 1:
+            place = np.asarray(place)[:, np.newaxis]
         given = self._as_filled("place", place, sizes, which, "stands at")
         _require_rows("place", given, count)
         places = np.full((count, _core.MAX_PLACE), np.nan, self._dtype)

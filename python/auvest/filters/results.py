@@ -1,4 +1,4 @@
-"""What the filters of the family report: :class:`Report` of an update, :class:`RunResult` of a run."""
+"""What the filters report: :class:`Report` of an update, :class:`RunResult` of a run."""
 
 from __future__ import annotations
 

@@ -5,19 +5,26 @@ from __future__ import annotations
 from typing import Any
 
 from auvest.models._base import MeasurementModel, Model, ProcessModel
+from auvest.models.body_velocity import BodyVelocity
 from auvest.models.constant_acceleration import ConstantAcceleration
+from auvest.models.depth import Depth
 from auvest.models.functions import FunctionProcess, FunctionSensor, from_names
 from auvest.models.leader_range import LeaderRange
 from auvest.models.odometry import Odometry
+from auvest.models.position import Position
 from auvest.models.range_bearing import RangeBearing
+from auvest.models.range_bearing_elevation import RangeBearingElevation
 from auvest.models.speed_heading import SpeedHeading
+from auvest.models.white_acceleration import WhiteAcceleration
 
 #: Every process and every sensor, by the name of its class.
 PROCESSES: dict[str, type[ProcessModel]] = {
-    model.__name__: model for model in (ConstantAcceleration, Odometry, SpeedHeading)
+    model.__name__: model
+    for model in (ConstantAcceleration, Odometry, SpeedHeading, WhiteAcceleration)
 }
 SENSORS: dict[str, type[MeasurementModel]] = {
-    model.__name__: model for model in (LeaderRange, RangeBearing)
+    model.__name__: model
+    for model in (BodyVelocity, Depth, LeaderRange, Position, RangeBearing, RangeBearingElevation)
 }
 
 
@@ -46,15 +53,20 @@ def _plain(value: Any) -> Any:
 __all__ = [
     "PROCESSES",
     "SENSORS",
+    "BodyVelocity",
     "ConstantAcceleration",
+    "Depth",
     "FunctionProcess",
     "FunctionSensor",
     "LeaderRange",
     "MeasurementModel",
     "Model",
     "Odometry",
+    "Position",
     "ProcessModel",
     "RangeBearing",
+    "RangeBearingElevation",
     "SpeedHeading",
+    "WhiteAcceleration",
     "from_description",
 ]

@@ -164,7 +164,8 @@ class MeasurementModel(Model):
     measures : tuple of str
         Names of the numbers of a measurement, with units.
     place : str or None
-        Name of the field that says where the sensor (or what it ranges to) stands; None: nowhere.
+        Name of the field that comes with each measurement and is no part of it: where the station
+        or the leader stood, how the instrument was headed; None: nothing does.
     """
 
     observes: ClassVar[tuple[str, ...]] = ("x_m", "y_m")
@@ -176,14 +177,20 @@ class MeasurementModel(Model):
         return _core.sensor_defaults(self.core_name)
 
     def core(self, states: int, dtype: DType) -> _Sensor[Any]:
-        """Give the core's measurement model for so many states in this precision."""
+        """Give the core's measurement model for so many states in this precision.
+
+        Raises
+        ------
+        ValueError
+            If there is none for so many.
+        """
 
         def make() -> Any:
             known = _core.sensor_states(self.core_name)
             if states not in known:
+                numbers = ", ".join(str(n) for n in known)
                 raise ValueError(
-                    f"{type(self).__name__} is made for {', '.join(map(str, known[:-1]))} or "
-                    f"{known[-1]} states, not {states}"
+                    f"{type(self).__name__} is made for {numbers} states, not for {states}"
                 )
             make_sensor = getattr(_core, f"make_sensor_{dtype.name}")
             sensor = make_sensor(self.core_name, states, self.values(dtype.name))

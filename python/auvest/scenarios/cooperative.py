@@ -34,6 +34,9 @@ _STREAK = RejectionStreak()
 #: Rows (runs times steps) of one simulation at most: 64 bytes each.
 MAX_SAMPLES = 20_000_000
 
+#: Messages that can be on their way to the slave at once; more are counted as overflowed.
+MESSAGES_IN_FLIGHT: int = _DEFAULTS["messages_in_flight"]
+
 #: 2.3 h of the paper's experiment, in steps of 1 s.
 PAPER_STEPS = 8280
 
@@ -101,7 +104,8 @@ class Scenario:
     dropout, late : float
         Probabilities, in 0..1, that a message is lost or late.
     late_steps : int
-        A late message is late by at most so many steps.
+        A late message is late by at most so many steps. Of many late messages and frequent ranges
+        some overflow: at most :data:`MESSAGES_IN_FLIGHT` are on their way at once.
     sigma_speed, sigma_heading : float
         True noise of the slave's instruments, m/s/sqrt(Hz) and rad/sqrt(Hz), not negative.
     range_every : int
@@ -169,15 +173,21 @@ class Result:
     covariance : ndarray, shape (runs, steps, 2, 2)
         What the filter thinks of them, m^2.
     nis : ndarray, shape (runs, steps)
-        Normalised innovation squared of a range that was taken at this step, else NaN.
+        Normalised innovation squared of the (last) range that was taken at this step, else NaN.
     weight : ndarray, shape (runs, steps)
         The weight it got, else NaN.
     samples : ndarray of int, shape (runs,)
         Steps done.
     recoveries : ndarray of int, shape (runs,)
         Times that the recovery widened the covariance.
+    taken : ndarray of int, shape (runs,)
+        Ranges that corrected the filter.
     too_late : ndarray of int, shape (runs,)
-        Steps at which a range was older than the filter's memory.
+        Ranges that were older than the filter's memory when they came.
+    lost : ndarray of int, shape (runs,)
+        Messages that never came, by ``dropout``.
+    overflowed : ndarray of int, shape (runs,)
+        Messages that were given up because :data:`MESSAGES_IN_FLIGHT` others were on their way.
     status : ndarray of uint8, shape (runs,)
         How each run ended: values of :class:`auvest.Status`, 0 is ok.
     scenario : Scenario
@@ -190,7 +200,10 @@ class Result:
     weight: npt.NDArray[np.float64]
     samples: npt.NDArray[np.int64]
     recoveries: npt.NDArray[np.int64]
+    taken: npt.NDArray[np.int64]
     too_late: npt.NDArray[np.int64]
+    lost: npt.NDArray[np.int64]
+    overflowed: npt.NDArray[np.int64]
     status: npt.NDArray[np.uint8]
     scenario: Scenario
 

@@ -318,8 +318,9 @@ def simulate(
     Parameters
     ----------
     filter : Ekf or Ukf
-        The prototype, with any kernel and interval policy: its models, parameters and belief (``x``, ``P``) are the start of every run.
-        It is not changed. Its station is the true station; its noise need not be the true noise.
+        The prototype, with any kernel and interval policy: its models, parameters and belief
+        (``x``, ``P``) are the start of every run. It is not changed. Its station is the true
+        station; its noise need not be the true noise.
     scenario : Scenario
         Track, noise, number of runs and so on.
     workers : int, optional

@@ -119,12 +119,28 @@ TEST_CASE("mixing: without switches nothing changes, not a bit; a dead model is 
   CHECK(mixed.mode[2].x == before.mode[2].x);
 }
 
+TEST_CASE("mixing: without switches not a bit changes, whatever the probabilities") {
+  Mixture mixed(4, Vector<double, 3>(0.7, 0.25, 0.05));
+  const Mixture before = mixed;
+  auvest::mix(mixed.pointers, mixed.log_weight, Shares(0.5, 0.2, 0.3), 1.0);
+  for (int k = 0; k < 3; ++k) {
+    CHECK(mixed.mode[k].x == before.mode[k].x);
+    CHECK(mixed.mode[k].P == before.mode[k].P);
+    CHECK(mixed.log_weight(k) == before.log_weight(k));
+  }
+}
+
 TEST_CASE("models are refused where shares are none, rates are negative or a model is") {
   ThreeModels::Params params;
   CHECK(ThreeModels(params).check() == Status::kOk);
   CHECK(params.share.sum() == close_to(1, 1e-15));
   for (const double bad : {-0.1, 0.9, std::nan("")}) {
     params.share << bad, 0.5, 0.5;
+    CHECK(ThreeModels(params).check() == Status::kBadParameter);
+  }
+  for (int j = 0; j < 3; ++j) {  // negative, and their sum is 1
+    params.share.setConstant(0.55);
+    params.share(j) = -0.1;
     CHECK(ThreeModels(params).check() == Status::kBadParameter);
   }
   params.share << 0, 0.5, 0.5;

@@ -96,6 +96,52 @@ TEST_CASE("late updates: a time between two steps is that of the nearer") {
   }
 }
 
+TEST_CASE("late updates: with a full memory, one that is older than all that is kept") {
+  Filter plain = slave();
+  Late<4> late(slave());
+  REQUIRE(plain.update(range(1), leader(1)).status == Status::kOk);
+  for (int k = 0; k < 4; ++k) {
+    REQUIRE(plain.predict(1, motion(k)) == Status::kOk);
+    REQUIRE(late.predict(1, motion(k)) == Status::kOk);
+    if (k == 1) REQUIRE(plain.update(range(2), leader(2)).status == Status::kOk);
+  }
+  REQUIRE(late.update(range(1), leader(1), 4).status == Status::kOk);
+  REQUIRE(late.update(range(2), leader(2), 2).status == Status::kOk);  // goes on from the first
+  CHECK(same(late.filter(), plain));
+}
+
+TEST_CASE("late updates: where a later event cannot be repeated nothing changes, then or later") {
+  // A range of 3e19 m is a NIS of 9e34 to a slave that may be 100 m off. After a good range to the
+  // same leader, of which it learns only now, it would be one of 6e38, beyond float.
+  using Plain = auvest::Ekf<Process>;
+  using Memory = auvest::LateUpdates<Plain, Range, 8>;
+  Range::Params far;
+  far.leader_x_m = 1e6f;
+  const Range sensor(far);
+  const Input still(0, 0, 0);
+  Plain filter{Process()};
+  REQUIRE(filter.reset(Vector<float, 2>(0, 0), 1e4f * Matrix<float, 2, 2>::Identity()) ==
+          Status::kOk);
+  Memory late(filter), other(filter);
+  for (Memory* each : {&late, &other}) {
+    REQUIRE(each->predict(1, still) == Status::kOk);
+    REQUIRE(each->predict(1, still) == Status::kOk);
+    REQUIRE(each->update(Z(3e19f), sensor).status == Status::kOk);
+  }
+  const auto refused = late.update(Z(1e6f), sensor, 1);
+  CHECK(refused.status == Status::kOverflow);
+  CHECK(refused.nis == 0);
+  CHECK(refused.S(0, 0) == 0);
+  CHECK(late.filter().x() == other.filter().x());
+  CHECK(late.filter().P() == other.filter().P());
+  far.sigma_range_m = 1e5f;  // one that says little can be taken in, before the same event
+  for (Memory* each : {&late, &other}) {
+    REQUIRE(each->update(Z(1e6f), Range(far), 1).status == Status::kOk);
+  }
+  CHECK(late.filter().x() == other.filter().x());
+  CHECK(late.filter().P() == other.filter().P());
+}
+
 TEST_CASE("late updates: what is refused changes nothing, then or later") {
   Late<8> late(slave()), other(slave());
   const auto check_refused = [&](const Z& z, float age, Status wanted) {

@@ -289,6 +289,30 @@ TEST_CASE("robust update: the number of iterations is bounded, weights are those
   check_textbook(filter, z, correction.weight);
 }
 
+TEST_CASE("robust update: post-fit residuals that are all rejected end the iteration") {
+  using Rule = auvest::RobustUpdate<auvest::Igg<double>>;
+  Rule::Params params;
+  params.residual = Residual::kPostFit;
+  auto filter = robust_ekf(Rule{auvest::Igg<double>(), auvest::NoRecovery<double>(), params});
+  const Vector<double, kM> z(70, -80);
+  const auto correction = filter.update(z, sensor());
+  REQUIRE(correction.status == Status::kOk);
+  CHECK(correction.decision == Decision::kRejected);
+  CHECK(correction.iterations == 1);  // the next would take a measurement of nothing
+  for (int m = 0; m < kM; ++m) CHECK(correction.weight(m) == 0);
+  const Matrix<double, kM, kM> s =
+      sensor().matrix * prior() * sensor().matrix.transpose() + sensor().noise;
+  CHECK(correction.nis == close_to(z.dot(s.inverse() * z), 1e-12));
+  // The residuals that were judged are those after the plain update.
+  const Vector<double, kM> residual = sensor().noise * s.inverse() * z;
+  for (int m = 0; m < kM; ++m) {
+    CHECK(correction.standardised(m) ==
+          close_to(residual(m) / std::sqrt(sensor().noise(m, m)), 1e-12));
+  }
+  CHECK(filter.x() == (Vector<double, kN>::Zero()));
+  CHECK(filter.P() == prior());
+}
+
 TEST_CASE("robust update: a change of weight within the tolerance is none") {
   using Rule = auvest::RobustUpdate<auvest::Huber<double>>;
   Rule::Params params;
@@ -354,6 +378,12 @@ TEST_CASE("robust update: refuses what the plain one refuses, and bad parameters
     CHECK(alone.status == (r < 0 ? Status::kNotPositiveDefinite : Status::kOverflow));
     CHECK(alone.S(0, 0) == 0);
   }
+  Sensor indefinite = sensor();  // beside a wide prior S does not show it
+  indefinite.noise << 0.1, 0.2, 0.2, 0.1;
+  const auto alike = filter.update(Vector<double, kM>(90, -90), indefinite);
+  CHECK(alike.status == Status::kNotPositiveDefinite);
+  CHECK(alike.decision == Decision::kAccepted);
+  CHECK(alike.nis == 0);
   CHECK(filter.P() == prior());
   CHECK(filter.rule().recovery.count == 0);
 

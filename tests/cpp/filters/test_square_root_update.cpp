@@ -141,6 +141,32 @@ TEST_CASE("square-root update: after an outage, float keeps what the fix says of
   CHECK(belief.x(1) == close_to(30 / time, 1e-5));
 }
 
+TEST_CASE("square-root update: float leaves a variance to what a precise fix tells all of") {
+  // The state that is not seen is a multiple of the one that is: the fix leaves 1e-12 of its
+  // variance, and P_uu - P_uo^2 / P_oo is rounding noise of either sign.
+  for (int k = 0; k < 50; ++k) {
+    const double multiple = 0.1 + 0.07 * k;
+    const double variance = 3 + 0.9 * k;
+    Belief<float, 2> belief;
+    belief.x.setZero();
+    belief.P << float(variance), 0, float(multiple * variance),
+        float(multiple * multiple * variance);
+    const double before = double(belief.P(1, 1));
+    Matrix<float, 1, 1> root;
+    Matrix<float, 1, 1> slope;
+    const bool positive = auvest::math::factor_leading(belief.P, root, slope);
+    REQUIRE(positive);
+    Matrix<float, 1, 1> a(root(0, 0));
+    Matrix<float, 1, 1> noise(1e-12f);
+    Correction<float, 1> correction(Status::kOk);
+    correction.innovation << 1;
+    REQUIRE(auvest::SquareRootUpdate()(belief, root, slope, a, noise, correction) == Status::kOk);
+    const double epsilon = double(std::numeric_limits<float>::epsilon());
+    CHECK(double(belief.P(1, 1)) >= 4 * epsilon * before);  // what the format resolves, ...
+    CHECK(double(belief.P(1, 1)) < 8 * epsilon * before);   // ... and no more
+  }
+}
+
 TEST_CASE("square-root update: what would overflow is refused and changes nothing") {
   for (const float innovation : {1e38f, 3e38f}) {
     Belief<float, 2> belief;
@@ -259,6 +285,31 @@ TEST_CASE("square-root update: what a range cannot do leaves the belief") {
   CHECK(with(1, 1e200) == Status::kOverflow);
   CHECK(belief.x == before.x);
   CHECK(belief.P == before.P);
+}
+
+TEST_CASE("square-root update: a range that takes one coordinate beyond the format is refused") {
+  for (int k = 0; k < 2; ++k) {
+    CAPTURE(k);
+    auvest::Belief<double, 2> belief;
+    belief.x << 1, 1;
+    belief.x(k) = 1.79e308;
+    belief.P << 1, 0, 0, 1;
+    belief.P(k, k) = 1e306;
+    const auvest::Belief<double, 2> before = belief;
+    Matrix<double, 2, 2> root;
+    Matrix<double, 1, 2> slope;
+    const bool positive = auvest::math::factor_leading(belief.P, root, slope);
+    REQUIRE(positive);
+    Matrix<double, 1, 2> a(0, 0);
+    a(k) = 1;
+    Matrix<double, 1, 1> noise(1.0);
+    Correction<double, 1> correction(Status::kOk);
+    correction.innovation(0) = 1.5e154;  // its NIS is 1.1e308, and it moves x(k) by 7.5e306
+    correction.S(0, 0) = 2;
+    CHECK(auvest::correct_belief(belief, root, slope, a, noise, correction) == Status::kOverflow);
+    CHECK(belief.x == before.x);
+    CHECK(belief.P == before.P);
+  }
 }
 
 }  // namespace

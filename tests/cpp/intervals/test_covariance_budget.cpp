@@ -6,7 +6,6 @@
 #include "auvest/intervals/covariance_budget.hpp"
 #include "auvest/intervals/fixed_interval.hpp"
 #include "auvest/models/constant_acceleration.hpp"
-#include "auvest/models/range_bearing.hpp"
 
 namespace {
 
@@ -51,48 +50,6 @@ TEST_CASE("budget: out of reach gives T_min, never needed gives T_max") {
   Budgeted loose = filter_with(10);
   REQUIRE(loose.feedback(Vector<double, 2>::Zero()) == Status::kOk);
   CHECK(loose.interval() == 1);
-}
-
-TEST_CASE("adaptive interval: reset, refusal and restore") {
-  Budgeted filter = filter_with(0.1);
-  CHECK(filter.interval() == 0.5);  // T(0) until the first feedback
-  const Vector<double, 2> nan = Vector<double, 2>::Constant(std::nan(""));
-  CHECK(filter.feedback(nan) == Status::kNotFinite);
-  CHECK(filter.reset(filter.x(), filter.P(), nan) == Status::kNotFinite);
-  CHECK(filter.interval() == 0.5);
-
-  auvest::Aukf<Process> law{auvest::Ukf<Process>(Process())};
-  CHECK(law.feedback(Vector<double, 2>::Zero()) == Status::kNotInitialised);
-  REQUIRE(law.reset(filter.x(), filter.P()) == Status::kOk);
-  REQUIRE(law.predict(law.interval()) == Status::kOk);
-  REQUIRE(law.feedback(Vector<double, 2>(0.1, 0.2)) == Status::kOk);
-  auvest::Aukf<Process> copy{auvest::Ukf<Process>(Process())};
-  REQUIRE(copy.restore(law.belief(), law.policy(), law.interval()) == Status::kOk);
-  law.feedback(Vector<double, 2>(0.2, 0.4));
-  copy.feedback(Vector<double, 2>(0.2, 0.4));
-  CHECK(copy.interval() == law.interval());
-  CHECK(copy.policy().memory.tau == law.policy().memory.tau);
-  CHECK(copy.restore(law.belief(), law.policy(), std::nan("")) == Status::kNotFinite);
-}
-
-TEST_CASE("adaptive interval: made in place it is the filter with the default policy") {
-  auvest::Ukf<Process>::Params points;
-  points.alpha = 0.25;
-  auvest::Aukf<Process> in_place(Process(), points);
-  auvest::Aukf<Process> copied{auvest::Ukf<Process>(Process(), points)};
-  const Budgeted start = filter_with(0.1);
-  for (auvest::Aukf<Process>* filter : {&in_place, &copied}) {
-    REQUIRE(filter->reset(start.x(), start.P()) == Status::kOk);
-    REQUIRE(filter->predict(filter->interval()) == Status::kOk);
-    const Vector<double, 2> z(2.3, 0.9);
-    REQUIRE(filter->update(z, auvest::RangeBearing<double, 6>()).status == Status::kOk);
-    REQUIRE(filter->feedback(Vector<double, 2>(0.1, 0.2)) == Status::kOk);
-  }
-  CHECK(in_place.x() == copied.x());
-  CHECK(in_place.P() == copied.P());
-  CHECK(in_place.interval() == copied.interval());
-  points.alpha = 2;
-  CHECK(auvest::Aukf<Process>(Process(), points).check() == Status::kBadParameter);
 }
 
 TEST_CASE("bad parameters are reported") {

@@ -120,6 +120,20 @@ TEST_CASE("figure3: the steady interval is the fixed point at d^2 = 1.5, M = 0.9
   CHECK(t == close_to(0.576 / 0.964, 1e-6));
 }
 
+TEST_CASE("table1: the numbers of the paper's Table 1, and tau by them") {
+  const Law::Params p = Law::Params::table1();
+  CHECK(p.gamma1_m2 == 10);
+  CHECK(p.gamma2 == 100);
+  CHECK(p.min_s == 0.01);
+  Law law(p);
+  law.restart(Position(0, 0), Position(0, 0));
+  // Points 0, 0, 5, 5 on a line: d^2 = 0.75. d_t = d_e = 5.
+  const double t = law.next(Estimate{Position(3, 4)}, Position(3, 4));
+  CHECK(law.memory.ratio == close_to(25.0 / 35.0, 1e-14));
+  CHECK(t == close_to(0.5 * 0.1 * 0.5 + 0.5 * (25.0 / 35.0), 1e-14));
+  CHECK(law.memory.tau == close_to(1.6 / 100.75, 1e-12));
+}
+
 TEST_CASE("table1: tau is at most eps / gamma2, so T falls to T_min (finding 1)") {
   Law law(Law::Params::table1());
   Position r(0, 0);
@@ -173,6 +187,9 @@ TEST_CASE("bad parameters are reported") {
   CHECK(changed(&P::epsilon, 0) == Status::kBadParameter);
   CHECK(changed(&P::scale, 1.5) == Status::kBadParameter);
   CHECK(changed(&P::ratio_max, 0) == Status::kBadParameter);
+  CHECK(changed(&P::ratio_max, 1) == Status::kOk);
+  CHECK(changed(&P::ratio_max, 1.1) == Status::kBadParameter);
+  CHECK(changed(&P::ratio_max, std::nan("")) == Status::kBadParameter);
   CHECK(changed(&P::tau_max, 1) == Status::kBadParameter);
   CHECK(changed(&P::tau_min, 0) == Status::kBadParameter);
 }

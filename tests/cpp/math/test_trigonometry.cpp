@@ -105,6 +105,12 @@ TEST_CASE("sin, cos, sincos: special values") {
     CHECK(same_bits(math::sin(x), static_cast<float>(std::sin(static_cast<double>(x)))));
     CHECK(math::cos(x) == 1.0f);
   }
+  for (float x : {0.0f, -0.0f, 1e-45f, -1e-45f, FLT_MIN, -1e-20f, -2e-4f}) {
+    float s = 1.0f, c = 0.0f;
+    math::sincos(x, s, c);
+    CHECK(same_bits(s, math::sin(x)));  // and so the sign of a zero
+    CHECK(c == 1.0f);
+  }
   const float none[] = {kInfinity, -kInfinity, kNan};
   for (float x : none) {
     CHECK(math::to_bits(math::sin(x)) == 0x7fc00000u);

@@ -165,18 +165,53 @@ TEST_CASE("unicycle motion: one step's noise has rank 2, the heading stays wrapp
   CHECK(x(2) == close_to(3.3 - auvest::math::two_pi<double>(), 1e-12));
 }
 
+TEST_CASE("unicycle motion: the headings of samples stay wrapped through many turns") {
+  const Unicycle motion;
+  const double pi = auvest::math::pi<double>();
+  Random random(34);
+  const auto step = motion.step(Vector<double, 2>(1, 0.4), 0.5);
+  for (int particle = 0; particle < 5; ++particle) {
+    Vector<double, 3> pose(0, 0, 0.5 * particle);
+    double turned = pose(2);  // the same without wrapping
+    for (int k = 0; k < 1000; ++k) {
+      double a, b;
+      random.normal_pair(a, b);
+      motion.sample(step, a, b, pose);
+      turned += 0.5 * (0.4 + motion.params.sigma_yaw_rate_radps * b);
+      CHECK(pose(2) > -pi);
+      CHECK(pose(2) <= pi);
+      CHECK(std::fabs(auvest::math::wrap(pose(2) - turned)) < 1e-11);
+    }
+    CHECK(turned > 30 * 2 * pi);
+  }
+}
+
 TEST_CASE("slave motion: bad parameters") {
-  Compass::Params compass;
-  CHECK(Compass(compass).check() == auvest::Status::kOk);
-  compass.sigma_speed_mps = -1;
-  CHECK(Compass(compass).check() == auvest::Status::kBadParameter);
-  compass.sigma_speed_mps = 1;
-  compass.sigma_heading_rad = 4;
-  CHECK(Compass(compass).check() == auvest::Status::kBadParameter);
-  Unicycle::Params unicycle;
-  CHECK(Unicycle(unicycle).check() == auvest::Status::kOk);
-  unicycle.sigma_yaw_rate_radps = std::nan("");
-  CHECK(Unicycle(unicycle).check() == auvest::Status::kBadParameter);
+  using auvest::Status;
+  const auto compass = [](double speed, double heading) {
+    Compass::Params params;
+    params.sigma_speed_mps = speed;
+    params.sigma_heading_rad = heading;
+    return Compass(params).check();
+  };
+  CHECK(Compass().check() == Status::kOk);
+  CHECK(compass(0, 0) == Status::kOk);
+  CHECK(compass(1, 3) == Status::kOk);
+  CHECK(compass(1, 3.001) == Status::kBadParameter);
+  const auto unicycle = [](double speed, double yaw_rate) {
+    Unicycle::Params params;
+    params.sigma_speed_mps = speed;
+    params.sigma_yaw_rate_radps = yaw_rate;
+    return Unicycle(params).check();
+  };
+  CHECK(Unicycle().check() == Status::kOk);
+  CHECK(unicycle(0, 0) == Status::kOk);
+  for (const double bad : {-1.0, std::nan(""), HUGE_VAL}) {
+    CHECK(compass(bad, 0.3) == Status::kBadParameter);
+    CHECK(compass(1, bad) == Status::kBadParameter);
+    CHECK(unicycle(bad, 0.01) == Status::kBadParameter);
+    CHECK(unicycle(1, bad) == Status::kBadParameter);
+  }
 }
 
 }  // namespace

@@ -118,6 +118,17 @@ TEST_CASE("sonar: bad parameters") {
     params.sigma_bearing_rad = sigma;
     CHECK(Sonar(params).check(2) == auvest::Status::kBadParameter);
   }
+  // More than 1e-6, as documented.
+  for (double Sonar::Params::*sigma :
+       {&Sonar::Params::sigma_range_m, &Sonar::Params::sigma_bearing_rad}) {
+    Sonar::Params params;
+    for (const double too_small : {5e-7, 1e-6}) {
+      params.*sigma = too_small;
+      CHECK(Sonar(params).check(2) == auvest::Status::kBadParameter);
+    }
+    params.*sigma = 2e-6;
+    CHECK(Sonar(params).check(2) == auvest::Status::kOk);
+  }
 }
 
 }  // namespace

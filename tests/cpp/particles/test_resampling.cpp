@@ -135,12 +135,71 @@ TEST_CASE("resampling: one heavy particle, one particle, many particles in float
   check_edges<auvest::MultinomialResampling>();
 }
 
+/// The first number is 0, which uniform() gives once in 2^24.
+Random first_zero() {
+  Random random(1);
+  const uint32_t state[4] = {0, 1, 0, 0};
+  random.set_state(state);
+  return random;
+}
+
+template <class Policy>
+void check_position_zero() {
+  Random random = first_zero();
+  REQUIRE(random.uniform<float>() == 0);
+  random = first_zero();
+  std::vector<float> w = {0, 0, 3, 1, 4};
+  count<Policy>(w, random);
+  CHECK(w[0] == 0);  // a share without length is not met by the position on its edge
+  CHECK(w[1] == 0);
+  CHECK(w[2] >= 1);
+  CHECK(w[2] + w[3] + w[4] == 5);
+}
+
+TEST_CASE("resampling: a position of 0 falls on the first particle with a weight") {
+  check_position_zero<auvest::SystematicResampling>();
+  check_position_zero<auvest::StratifiedResampling>();
+  check_position_zero<auvest::ResidualResampling>();
+  check_position_zero<auvest::MultinomialResampling>();
+}
+
+TEST_CASE("resampling: a position on the edge of two shares falls on the second") {
+  Random random = first_zero();
+  std::vector<float> w = {1, 1, 0, 2};  // positions 0, 1, 2 and 3, sums 1, 2, 2 and 4
+  count<auvest::SystematicResampling>(w, random);
+  CHECK(w == std::vector<float>({1, 1, 0, 2}));
+}
+
+TEST_CASE("resampling: positions that rounding leaves behind all go to the last with a weight") {
+  double w[5] = {1, 0, 2, 0, 0};
+  auvest::detail::count_positions(w, 5, 3.0, 3, auvest::detail::WholeWeight(),
+                                  [](int k) { return k == 0 ? 0.1 : 1.0; });
+  CHECK(w[0] == 1);
+  CHECK(w[1] == 0);
+  CHECK(w[2] == 2);
+  CHECK(w[3] == 0);
+  CHECK(w[4] == 0);
+}
+
+TEST_CASE("resampling: sorted uniform positions, also from a first number of 0") {
+  Random random = first_zero();
+  auvest::detail::SortedUniforms<float> positions(6, random);
+  CHECK(positions(0) == 0);  // the least of six may be 0, and the others lie above it
+  float last = 0;
+  for (int k = 1; k < 6; ++k) {
+    const float position = positions(k);
+    CHECK(position > last);
+    CHECK(position < 1);
+    last = position;
+  }
+}
+
 TEST_CASE("redistribute: in place, the same particles as with a second set") {
   using Set = auvest::ParticleSet<double, 3>;
   Random random(12);
   for (int trial = 0; trial < 300; ++trial) {
     const int n = 1 + trial % 50;
-    std::vector<double> storage(Set::storage_size(n));
+    std::vector<double> storage(Set::storage_size(n), std::nan(""));
     Set set(storage.data(), n);
     set.resize(n);
     std::vector<double> w =
@@ -166,8 +225,10 @@ TEST_CASE("redistribute: in place, the same particles as with a second set") {
     }
     std::sort(found.begin(), found.end());
     CHECK(found == expected);
-    for (int i = n; i % auvest::kBlock != 0; ++i)
+    for (int i = n; i % auvest::kBlock != 0; ++i) {
       CHECK(auvest::weight_of(set.log_weights()[i]) == 0);
+      for (int f = 0; f < 3; ++f) CHECK(*set.at(i, f) == *set.at(n - 1, f));  // numbers, too
+    }
   }
 }
 

@@ -229,6 +229,110 @@ TEST_CASE("lock-out: at the limit the belief is widened as stated") {
   CHECK(filter.rule().recovery.recent.isZero());
 }
 
+/// r^2 - S of a range that is too short by `error_m`, to a leader far away in the east.
+double needed(const Slave& filter, double error_m) {
+  return error_m * error_m - (filter.P()(1, 1) + 1);
+}
+
+TEST_CASE("lock-out: a streak that ends by acceptances asks for nothing later") {
+  Slave filter = patient(3);
+  CHECK(count_after(filter, 90, 90) == 4);
+  CHECK(filter.rule().recovery.variance == close_to(needed(filter, 90), 1e-6));
+  CHECK(count_after(filter, 90, 0) == 2);
+  CHECK(filter.rule().recovery.variance > 8000);  // not yet
+  CHECK(count_after(filter, 90, 0) == 0);
+  CHECK(filter.rule().recovery.variance == 0);
+  CHECK(count_after(filter, 0, 40) == 4);
+  CHECK(count_after(filter, 180, 40) == 8);
+  const double before = filter.P()(1, 1);
+  const double wanted = needed(filter, 40);
+  CHECK(count_after(filter, 90, 40) == 12);
+  CHECK(filter.P()(1, 1) - before == close_to(wanted, 0.001));  // 1600, not 8100
+}
+
+TEST_CASE("lock-out: after a recovery the next rejection widens by its own need alone") {
+  Slave filter = patient(3);
+  for (int k = 0; k < 3; ++k) count_after(filter, 90, 90);
+  CHECK(filter.P()(1, 1) > 8000);  // recovered
+  CHECK(filter.rule().recovery.variance == 0);
+  CHECK(count_after(filter, 90, 0) == 10);  // and the leader in the east narrows it again
+  CHECK(filter.P()(1, 1) < 2);
+  CHECK(count_after(filter, 90, 40) == 11);  // not the 90 m of before
+  const double before = filter.P()(1, 1);
+  const double wanted = needed(filter, 40);
+  CHECK(count_after(filter, 90, 40) == 12);
+  CHECK(filter.P()(1, 1) - before == close_to(wanted, 0.001));
+  CHECK(filter.rule().recovery.variance == 0);
+}
+
+TEST_CASE("lock-out: the belief is widened by what the greatest of the rejections asks for") {
+  Slave filter = patient(3);
+  CHECK(count_after(filter, 90, 90) == 4);
+  CHECK(count_after(filter, 90, 40) == 5);
+  const double before = filter.P()(1, 1);
+  const double wanted = needed(filter, 90);
+  CHECK(count_after(filter, 90, 40) == 12);
+  CHECK(filter.P()(1, 1) - before == close_to(wanted, 0.001));
+}
+
+TEST_CASE("lock-out: components of one measurement do not repeat each other") {
+  using Still = auvest::LinearProcess<double, 2>;
+  using Pair = auvest::LinearMeasurement<double, 2, 2>;
+  using Square = Matrix<double, 2, 2>;
+  auvest::Robust<auvest::Ekf<Still>, Rule> filter{
+      auvest::Ekf<Still>(Still(Square::Identity(), Square::Zero()))};
+  REQUIRE(filter.reset(Vector<double, 2>(0, 0), Square::Identity()) == Status::kOk);
+  Square rows;  // both see the first state
+  rows << 1, 0, 1, 0;
+  const Pair sensor(rows, Square::Identity());
+  const auto first = filter.update(Vector<double, 2>(40, 40), sensor);
+  REQUIRE(first.decision == Decision::kRejected);
+  CHECK(filter.rule().recovery.count == 4);
+  CHECK(filter.rule().recovery.recent(0, 2) == 40);  // both are remembered
+  CHECK(filter.rule().recovery.recent(1, 2) == 40);
+  // One that was measured later does repeat them.
+  REQUIRE(filter.update(Vector<double, 2>(40, 40), sensor).decision == Decision::kRejected);
+  CHECK(filter.rule().recovery.count == 11);
+}
+
+TEST_CASE("lock-out: parameters and saved counts out of their range are refused") {
+  const auto status = [](int rejections, int count) {
+    Streak::Params params;
+    params.rejections = static_cast<std::uint8_t>(rejections);
+    Streak streak(params);
+    streak.count = static_cast<std::uint8_t>(count);
+    return streak.check();
+  };
+  CHECK(Streak().check() == Status::kOk);
+  CHECK(status(0, 0) == Status::kBadParameter);
+  CHECK(status(1, 0) == Status::kOk);
+  CHECK(status(60, 240) == Status::kOk);
+  CHECK(status(61, 0) == Status::kBadParameter);  // from 64 on no count would reach the limit
+  CHECK(status(64, 0) == Status::kBadParameter);
+  CHECK(status(3, 12) == Status::kOk);
+  CHECK(status(3, 13) == Status::kBadParameter);
+  for (const double bad : {-1.0, std::nan(""), HUGE_VAL}) {
+    Streak streak;
+    streak.variance = bad;
+    CHECK(streak.check() == Status::kBadParameter);
+  }
+  for (const double bad : {std::nan(""), HUGE_VAL}) {
+    Streak streak;
+    streak.recent(1, 2) = bad;
+    CHECK(streak.check() == Status::kBadParameter);
+  }
+
+  Slave filter = patient(3);
+  count_after(filter, 90, 40);
+  Rule saved = filter.rule();
+  saved.recovery.count = 13;
+  CHECK(filter.restore(filter.belief(), saved) == Status::kBadParameter);
+  CHECK(filter.rule().recovery.count == 4);
+  saved.recovery.count = 12;
+  CHECK(filter.restore(filter.belief(), saved) == Status::kOk);
+  CHECK(filter.rule().recovery.count == 12);
+}
+
 TEST_CASE("lock-out: n outliers by chance cost the prior's knowledge, not the position") {
   auto filter = slave<auvest::Ekf, Streak>();
   REQUIRE(filter.reset(Vector<double, 2>(0, 0), Matrix<double, 2, 2>::Identity()) == Status::kOk);

@@ -3,8 +3,10 @@
 
 #include "close.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <vector>
 
 #include "auvest/auvest.hpp"
 #include "simulation/cooperative.hpp"
@@ -179,6 +181,94 @@ TEST_CASE("cooperative: same seed, same run") {
   CHECK(a.ranges == 100);
   CHECK(a.square == b.square);
   CHECK(a.square != c.square);
+}
+
+// ---- Messages
+// ---------------------------------------------------------------------------------
+
+/// Sums over a run; a correction is reported at the steps that took a range, and is of one.
+struct Messages {
+  auvest::MessageCounts sum;
+
+  template <class Step>
+  void operator()(const Step& step) {
+    sum.taken += step.messages.taken;
+    sum.too_late += step.messages.too_late;
+    sum.lost += step.messages.lost;
+    sum.overflowed += step.messages.overflowed;
+    REQUIRE((step.correction != nullptr) == (step.messages.taken > 0));
+    if (step.correction != nullptr) {
+      REQUIRE(step.correction->status == Status::kOk);
+      REQUIRE(step.correction->weight(0) > 0);  // the kernel is the unit kernel
+    }
+  }
+};
+
+/// The same draws, and nothing but messages that come and go: lost ones, those beyond eight, those
+/// that arrive, and those on their way at the end.
+struct Journeys {
+  std::uint32_t lost = 0, overflowed = 0, arrived = 0;
+  std::vector<std::uint32_t> pending;  ///< when they arrive
+
+  Journeys(const CooperativeScenario& scenario, std::uint64_t seed, std::uint32_t steps) {
+    Random random(seed);
+    for (std::uint32_t k = 1; k <= steps; ++k) {
+      double speed, heading;
+      random.normal_pair(speed, heading);
+      if (k % scenario.range_every == 0) {
+        scenario.noise.draw(random);
+        const bool in_water = random.uniform<double>() < scenario.dropout;
+        std::uint32_t arrives = k + 2 * scenario.range_every;
+        if (random.uniform<double>() < scenario.late) {
+          arrives += 1 + static_cast<std::uint32_t>(random.uniform<double>() * scenario.late_steps);
+        }
+        if (in_water) {
+          ++lost;
+        } else if (pending.size() == 8) {
+          ++overflowed;
+        } else {
+          pending.push_back(arrives);
+        }
+      }
+      const auto here = std::remove(pending.begin(), pending.end(), k);
+      arrived += static_cast<std::uint32_t>(pending.end() - here);
+      pending.erase(here, pending.end());
+    }
+  }
+};
+
+TEST_CASE("cooperative: every message is counted once, whatever becomes of it") {
+  struct Case {
+    std::uint32_t range_every, late_steps;
+    double dropout;
+    bool overflows, comes_too_late;
+  };
+  const std::uint32_t steps = 2000;
+  for (const Case& c : {Case{5, 10, 0.2, false, false},  // the defaults
+                        Case{1, 5, 0.2, false, false},   // 7 steps under way at most: 8 at once
+                        Case{1, 6, 0.2, true, false},    // 8 steps: a ninth is sent meanwhile
+                        Case{8, 100, 0.1, true, true}}) {
+    CAPTURE(c.range_every);
+    CAPTURE(c.late_steps);
+    CooperativeScenario scenario;
+    scenario.timing = auvest::RangeTiming::kOwnTime;
+    scenario.range_every = c.range_every;
+    scenario.late = 0.9;
+    scenario.late_steps = c.late_steps;
+    scenario.dropout = c.dropout;
+    const Journeys expected(scenario, 3, steps);
+    Messages messages;
+    run(With<auvest::Unit<double>>(Ekf(Process())), scenario, Range(), 3, steps, messages);
+    CHECK(messages.sum.lost == expected.lost);
+    CHECK(messages.sum.overflowed == expected.overflowed);
+    CHECK(messages.sum.taken + messages.sum.too_late == expected.arrived);
+    CHECK(messages.sum.taken > 0);
+    CHECK(messages.sum.lost > 0);
+    CHECK((messages.sum.overflowed > 0) == c.overflows);
+    CHECK((messages.sum.too_late > 0) == c.comes_too_late);
+    CHECK(expected.lost + expected.overflowed + expected.arrived + expected.pending.size() ==
+          steps / c.range_every);
+  }
 }
 
 TEST_CASE("cooperative: range noise has its two sizes") {

@@ -252,6 +252,31 @@ TEST_CASE("EKF-SLAT: a result that would not be finite is refused, with all echo
   CHECK(slat.belief().P(2, 2) < before.P(2, 2));
 }
 
+TEST_CASE("EKF-SLAT: a gate that is negative or not finite is refused, and so is a bad model") {
+  using Filter = auvest::EkfSlat<Compass<double>, Master<double>, 1>;
+  Random random(5);
+  Belief<double, 2> start;
+  start.x.setZero();
+  start.P.setIdentity();
+  Filter::Params params;
+  for (const double gate : {-0.1, std::nan(""), HUGE_VAL}) {
+    params.gate = gate;
+    Filter filter((Compass<double>()), Master<double>(), params);
+    CHECK(filter.reset(start, random) == Status::kBadParameter);
+  }
+  for (const double gate : {0.0, 16.0}) {
+    params.gate = gate;
+    Filter filter((Compass<double>()), Master<double>(), params);
+    CHECK(filter.reset(start, random) == Status::kOk);
+  }
+  Compass<double>::Params motion;
+  motion.sigma_heading_rad = std::nan("");
+  Filter filter((Compass<double>(motion)), Master<double>());
+  CHECK(filter.reset(start, random) == Status::kBadParameter);
+  auvest::DeadReckoning<Compass<double>> reckoning((Compass<double>(motion)));
+  CHECK(reckoning.reset(start, random) == Status::kBadParameter);
+}
+
 TEST_CASE("dead reckoning: the paper's bias in section 7 and its compensation") {
   for (const bool compensate : {false, true}) {
     Compass<double>::Params motion;
@@ -332,6 +357,23 @@ TEST_CASE("outage: starts from the last shared state, hands over when communicat
   slave.x(0) = std::nan("");
   CHECK(outage.share(slave, &master, 0) == Status::kNotFinite);
   CHECK(outage.mode() == auvest::Communication::kDown);
+}
+
+TEST_CASE("outage: the filter has the masters that were shared last, no more") {
+  using Filter = auvest::EkfSlat<Compass<double>, Master<double>, 2>;
+  auvest::Outage<Filter, 2> outage(Filter((Compass<double>()), Master<double>()));
+  Random random(6);
+  Belief<double, 2> slave;
+  slave.x << 7, 8;
+  slave.P.setIdentity();
+  const Belief<double, 6> masters[2] = {master_belief<double>(100, 200),
+                                        master_belief<double>(-100, 50)};
+  const Vector<double, 2> u(5, 0.2);
+  for (const int count : {2, 1, 0, 2}) {
+    REQUIRE(outage.share(slave, masters, count) == Status::kOk);
+    REQUIRE(outage.predict(1, u, random) == Status::kOk);
+    CHECK(outage.filter().masters() == count);
+  }
 }
 
 }  // namespace

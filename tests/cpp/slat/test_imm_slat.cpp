@@ -528,6 +528,75 @@ TEST_CASE("Imm: whatever is heard, and after a long silence, numbers stay number
   }
 }
 
+TEST_CASE("EKF-SLAT with an Imm: the NIS is the mean over the hypotheses before the echo") {
+  // Without switches the hypotheses are two plain filters, and their weights follow from the shares
+  // and from what each of them found likely so far.
+  using Two = auvest::Imm<Straight<double>, Accelerated<double>>;
+  Two::Params params;
+  params.switch_rate_hz = 0;
+  params.share << 0.7, 0.3;
+  const Unicycle<double> motion;
+  EkfSlat<Unicycle<double>, Two, 1> both(motion, Two(params));
+  EkfSlat<Unicycle<double>, Straight<double>, 1> straight(motion, Straight<double>());
+  EkfSlat<Unicycle<double>, Accelerated<double>, 1> accelerated(motion, Accelerated<double>());
+  Random random(42);
+  auto master = master_belief<double>(60, 80);
+  master.x(4) = 0.5;  // which the first takes for nothing
+  REQUIRE(both.reset(slave_belief<double>(0.01), random) == Status::kOk);
+  REQUIRE(straight.reset(slave_belief<double>(0.01), random) == Status::kOk);
+  REQUIRE(accelerated.reset(slave_belief<double>(0.01), random) == Status::kOk);
+  REQUIRE(both.add_master(master) == Status::kOk);
+  REQUIRE(straight.add_master(master) == Status::kOk);
+  REQUIRE(accelerated.add_master(master) == Status::kOk);
+  const auto sonar = sonar_from_heading<double>();
+  const Vector<double, 2> u(0, 0);
+  for (int k = 0; k < 4; ++k) {
+    REQUIRE(both.predict(2, u, random) == Status::kOk);
+    REQUIRE(straight.predict(2, u, random) == Status::kOk);
+    REQUIRE(accelerated.predict(2, u, random) == Status::kOk);
+    Sighting<double> seen;
+    seen.master = 0;
+    seen.z << 98 + 2 * k, -2.1 - 0.02 * k;
+    const double a = 0.7 * std::exp(straight.log_likelihood());
+    const double b = 0.3 * std::exp(accelerated.log_likelihood());
+    CHECK(both.mode_probability(0, 0) == close_to(a / (a + b), 1e-9));
+    REQUIRE(both.update(&seen, 1, sonar, random) == Status::kOk);
+    REQUIRE(straight.update(&seen, 1, sonar, random) == Status::kOk);
+    REQUIRE(accelerated.update(&seen, 1, sonar, random) == Status::kOk);
+    CHECK(std::fabs(straight.nis() - accelerated.nis()) > 0.01);
+    CHECK(both.nis() == close_to((a * straight.nis() + b * accelerated.nis()) / (a + b), 1e-9));
+  }
+}
+
+TEST_CASE("EKF-SLAT with an Imm: an echo that overflows in all hypotheses is refused") {
+  using Filter = EkfSlat<Unicycle<float>, Three<float>, 2>;
+  Filter filter(Unicycle<float>(), three_models<float>(0.1));
+  Random random(43);
+  REQUIRE(filter.reset(slave_belief<float>(0.01), random) == Status::kOk);
+  REQUIRE(filter.add_master(master_belief<float>(60, 80)) == Status::kOk);
+  REQUIRE(filter.add_master(master_belief<float>(1e25, 0)) == Status::kOk);  // its range overflows
+  const auto sonar = sonar_from_heading<float>();
+  Sighting<float> seen[2];
+  seen[0].master = 0;
+  seen[0].z << 98, -2.1f;
+  seen[1].master = 1;
+  seen[1].z << 300, 0;
+  REQUIRE(filter.update(seen, 1, sonar, random) == Status::kOk);
+  const auto before = filter.belief();
+  const float nis = filter.nis();
+  const float log_likelihood = filter.log_likelihood();
+  float probability[3];
+  for (int k = 0; k < 3; ++k) probability[k] = filter.mode_probability(0, k);
+  CHECK(nis > 0);
+  CHECK(filter.update(seen, 2, sonar, random) == Status::kOverflow);
+  CHECK(filter.belief().x == before.x);
+  CHECK(filter.belief().P == before.P);
+  CHECK(filter.nis() == nis);
+  CHECK(filter.log_likelihood() == log_likelihood);
+  for (int k = 0; k < 3; ++k) CHECK(filter.mode_probability(0, k) == probability[k]);
+  CHECK(filter.update(seen, 1, sonar, random) == Status::kOk);
+}
+
 TEST_CASE("EKF-SLAT with an Imm: what is refused leaves it as it was") {
   using Filter = EkfSlat<Unicycle<double>, Three<double>, 1>;
   Random random(41);
@@ -562,6 +631,12 @@ TEST_CASE("EKF-SLAT with an Imm: what is refused leaves it as it was") {
   none.share << 0, 0, 0;
   Filter bad{Unicycle<double>(), Three<double>(none)};
   CHECK(bad.reset(slave_belief<double>(0.01), random) == Status::kBadParameter);
+  for (const double gate : {-0.1, std::nan(""), HUGE_VAL}) {
+    Filter::Params params;
+    params.gate = gate;
+    Filter gated(Unicycle<double>(), three_models<double>(0.1), params);
+    CHECK(gated.reset(slave_belief<double>(0.01), random) == Status::kBadParameter);
+  }
 }
 
 }  // namespace

@@ -6,7 +6,9 @@
 #include "close.hpp"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "auvest/filters/ekf.hpp"
@@ -290,6 +292,33 @@ TEST_CASE_TEMPLATE("SLATF: refused calls leave all bits", Filter,
   CHECK(owner.storage == before);
 }
 
+TEST_CASE("SLATF: parameters out of their range are refused, those at its ends are not") {
+  using Params = auvest::SlatfParams<float>;
+  const auto status = [](float Params::*member, float value) {
+    Params params;
+    params.gate = 16;
+    params.*member = value;
+    Owner<auvest::Slatf1<Compass<float>, Master<float>, 1>> owner((Compass<float>()),
+                                                                  Master<float>(), 5, params);
+    Random random(1);
+    Belief<float, 2> start;
+    start.x.setZero();
+    start.P.setZero();
+    return owner.filter.reset(start, random);
+  };
+  for (const float bad : {-0.1f, std::nanf(""), INFINITY}) {
+    CHECK(status(&Params::resample_below, bad) == Status::kBadParameter);
+    CHECK(status(&Params::gate, bad) == Status::kBadParameter);
+    CHECK(status(&Params::birth_velocity_mps, bad) == Status::kBadParameter);
+    CHECK(status(&Params::birth_acceleration_mps2, bad) == Status::kBadParameter);
+  }
+  for (const float end : {0.0f, 1.0f}) CHECK(status(&Params::resample_below, end) == Status::kOk);
+  CHECK(status(&Params::resample_below, 1.001f) == Status::kBadParameter);
+  CHECK(status(&Params::gate, 0) == Status::kOk);
+  CHECK(status(&Params::birth_velocity_mps, 0) == Status::kOk);
+  CHECK(status(&Params::birth_acceleration_mps2, 0) == Status::kBadParameter);
+}
+
 TEST_CASE("SLATF: planned velocity changes move the master as Eq. (4) says") {
   using Filter = auvest::Slatf1<Compass<double>, Master<double>, 2>;
   Owner<Filter> owner((Compass<double>()), Master<double>(), 5);
@@ -455,6 +484,89 @@ TEST_CASE_TEMPLATE("SLATF: unknown echoes of masters far apart do what known one
   CHECK(a.storage == b.storage);
 }
 
+TEST_CASE("SLATF 1.0: a particle whose correction overflows weighs nothing, the others as before") {
+  using Filter = auvest::Slatf1<Compass<float>, Master<float>, 1>;
+  typename Filter::Params params;
+  params.resample_below = 0;
+  const int particles = 5;
+  const auvest::Sonar<float> sonar;
+  std::vector<float> weights[2];
+  int lost = 0;  // the heaviest
+  for (int overflows = 0; overflows < 2; ++overflows) {
+    Owner<Filter> owner((Compass<float>()), Master<float>(), particles, params);
+    Filter& filter = owner.filter;
+    Random random(91);
+    Belief<float, 2> start;
+    start.x.setZero();
+    start.P << 4, 0, 0, 4;
+    REQUIRE(filter.reset(start, random) == Status::kOk);
+    REQUIRE(filter.add_master(master_belief<float>(100, 150, 2, 1, 1)) == Status::kOk);
+    if (overflows == 1) {
+      // Its velocity is at the end of the format, and the echo that moves the position moves it on.
+      lost = static_cast<int>(std::max_element(weights[0].begin(), weights[0].end()) -
+                              weights[0].begin());
+      *filter.set().at(lost, Filter::kMasterField + 2) = std::numeric_limits<float>::max();
+      *filter.set().at(lost, Filter::kMasterField + 6 + 3) = 1e36f;  // P(2, 0)
+    }
+    Sighting<float> seen;
+    seen.master = 0;
+    seen.z << 184, -2.16f;
+    REQUIRE(filter.update(&seen, 1, sonar, random) == Status::kOk);
+    for (int i = 0; i < particles; ++i) {
+      weights[overflows].push_back(auvest::weight_of(filter.set().log_weight(i)));
+    }
+    CHECK(std::isfinite(filter.log_likelihood()));
+    if (overflows == 1) {  // and keeps what it believed
+      CHECK(*filter.set().at(lost, Filter::kMasterField) == 100);
+    }
+  }
+  const double share = double(weights[0][std::size_t(lost)]);
+  CHECK(share < 0.9);
+  for (int i = 0; i < particles; ++i) {
+    const double before = double(weights[0][std::size_t(i)]);
+    const double after = double(weights[1][std::size_t(i)]);
+    CHECK(std::fabs(after - (i == lost ? 0 : before / (1 - share))) < 1e-5);
+  }
+}
+
+TEST_CASE("SLATF: a master is born where the echo comes from, as far as the slave has turned") {
+  // Heard at 100 m and 0.5 rad off the bow of a slave that stands at (3, 4) and has turned by 1
+  // rad.
+  using First = auvest::Slatf1<auvest::UnicycleMotion<double>, Master<double>, 1>;
+  using Second = auvest::Slatf2<auvest::UnicycleMotion<double>, Master<double>, 1>;
+  auvest::SlatfParams<double> params;
+  params.gate = 16;
+  params.birth_velocity_mps = 2;
+  auvest::Sonar<double>::Params device;
+  device.bearing = auvest::Bearing::kFromHeading;
+  device.sigma_range_m = 0.5;
+  device.sigma_bearing_rad = 0.02;
+  Sighting<double> seen;
+  seen.master = auvest::kUnknownMaster;
+  seen.z << 100, 0.5;
+  Belief<double, 3> start;
+  start.x << 3, 4, 1;
+  start.P.setZero();
+  Random random(92);
+  Owner<First> first(auvest::UnicycleMotion<double>(), Master<double>(), 1, params);
+  Owner<Second> second(auvest::UnicycleMotion<double>(), Master<double>(), 1, params);
+  REQUIRE(first.filter.reset(start, random) == Status::kOk);
+  REQUIRE(second.filter.reset(start, random) == Status::kOk);
+  REQUIRE(first.filter.update(&seen, 1, auvest::Sonar<double>(device), random) == Status::kOk);
+  REQUIRE(second.filter.update(&seen, 1, auvest::Sonar<double>(device), random) == Status::kOk);
+  const double c = std::cos(1.5), s = std::sin(1.5);
+  const double along = 0.5 * 0.5, across = 100 * 0.02 * (100 * 0.02);
+  for (const Belief<double, 6>& master : {first.filter.master(0), second.filter.master(0)}) {
+    CHECK(master.x(0) == close_to(3 + 100 * c, 1e-13));
+    CHECK(master.x(1) == close_to(4 + 100 * s, 1e-13));
+    CHECK(master.x.tail<4>().norm() == 0);
+    CHECK(master.P(0, 0) == close_to(along * c * c + across * s * s, 1e-12));
+    CHECK(master.P(1, 0) == close_to((along - across) * c * s, 1e-12));
+    CHECK(master.P(1, 1) == close_to(along * s * s + across * c * c, 1e-12));
+    for (int k = 2; k < 6; ++k) CHECK(master.P(k, k) == close_to(k < 4 ? 4 : 1e-4, 1e-12));
+  }
+}
+
 TEST_CASE_TEMPLATE("SLATF: a master is born from an echo that nobody expects, once", Filter,
                    auvest::Slatf1<Compass<double>, Master<double>, 2>,
                    auvest::Slatf2<Compass<double>, Master<double>, 2>) {
@@ -490,6 +602,29 @@ TEST_CASE_TEMPLATE("SLATF: a master is born from an echo that nobody expects, on
   const double dy = master.x(1) - slave.x(1) - 30;
   CHECK(std::hypot(dx, dy) < 4 * 0.06 * 143);
   CHECK(master.P(0, 0) > 0);
+
+  // Through step() the same, to the bit.
+  Owner<Filter> stepwise((Compass<double>()), Master<double>(), 200, params);
+  Owner<Filter> in_two((Compass<double>()), Master<double>(), 200, params);
+  Random by_step(90), by_two(90);
+  REQUIRE(stepwise.filter.reset(start, by_step) == Status::kOk);
+  REQUIRE(in_two.filter.reset(start, by_two) == Status::kOk);
+  for (int k = 0; k < 4; ++k) {
+    Sighting<double> seen;
+    seen.master = auvest::kUnknownMaster;
+    seen.z << 100 + k, -2.4;
+    const Vector<double, 2> u(1, 0.3);
+    REQUIRE(stepwise.filter.step(1, u, nullptr, &seen, 1, sonar, by_step) == Status::kOk);
+    REQUIRE(in_two.filter.predict(1, u, by_two) == Status::kOk);
+    REQUIRE(in_two.filter.update(&seen, 1, sonar, by_two) == Status::kOk);
+    CHECK(stepwise.filter.masters() == 1);
+    CHECK(stepwise.filter.effective_size() == in_two.filter.effective_size());
+    for (int n = 0; n < stepwise.filter.masters(); ++n) {
+      CHECK(stepwise.filter.master(n).x == in_two.filter.master(n).x);
+      CHECK(stepwise.filter.master(n).P == in_two.filter.master(n).P);
+    }
+    CHECK(stepwise.filter.slave().x == in_two.filter.slave().x);
+  }
 
   params.gate = 0;  // births need a gate
   Owner<Filter> gateless((Compass<double>()), Master<double>(), 10, params);

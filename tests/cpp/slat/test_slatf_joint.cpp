@@ -329,6 +329,16 @@ TEST_CASE("SlatfJoint: refused calls leave all bits") {
     params.kept = share;
     Owner<Joint<float, 2>> wrong((Compass<float>()), Master<float>(), 5, params);
     CHECK(wrong.filter.reset(start, random) == Status::kBadParameter);
+    params = Joint<float, 2>::Params();
+    params.resample_below = share;
+    Owner<Joint<float, 2>> other((Compass<float>()), Master<float>(), 5, params);
+    CHECK(other.filter.reset(start, random) == Status::kBadParameter);
+  }
+  for (const float gate : {-0.1f, INFINITY, nan}) {
+    Joint<float, 2>::Params params;
+    params.gate = gate;
+    Owner<Joint<float, 2>> wrong((Compass<float>()), Master<float>(), 5, params);
+    CHECK(wrong.filter.reset(start, random) == Status::kBadParameter);
   }
 }
 

@@ -1,12 +1,12 @@
 // Planar constant velocity on the states [x, y, vx, vy, ax, ay] that the other models have, so that
 // they can stand side by side in an Imm.
 //
-// White accelerations of density q_v push the velocity: Bar-Shalom, Li and Kirubarajan, "Estimation
-// with applications to tracking and navigation", 6.2.2. White noise has no memory, so whatever the
-// acceleration was, dt > 0 seconds later it is N(0, sigma_a^2): what a manoeuvre may begin with.
+// White accelerations of density q_v push the velocity, as in WhiteAcceleration. White noise has no
+// memory, so whatever the acceleration was, dt > 0 seconds later it is N(0, sigma_a^2): what a
+// manoeuvre may begin with.
 #pragma once
 
-#include "auvest/models/process_model.hpp"
+#include "auvest/models/white_acceleration.hpp"
 
 namespace auvest {
 
@@ -61,17 +61,7 @@ struct ConstantVelocity : ProcessModel<ConstantVelocity<Scalar_>, Scalar_, 6> {
       AUVEST_UNROLL
       for (int j = 2; j <= i; ++j) p(i, j) = keep * p(i, j);
     }
-    const Value yx = p(2, 1);  // Cov(vx, y) and Cov(vy, x)
-    const Value xy = p(3, 0);
-    AUVEST_UNROLL
-    for (int i = 0; i < 2; ++i) {
-      const Value crossed = p(i + 2, i);
-      p(i + 2, i) = crossed + dt * p(i + 2, i + 2);
-      p(i, i) = p(i, i) + dt * (crossed + p(i + 2, i));
-    }
-    p(3, 0) = xy + dt * p(3, 2);
-    p(2, 1) = yx + dt * p(3, 2);
-    p(1, 0) = p(1, 0) + dt * (yx + p(3, 0));
+    Motion::spread(p, dt);
     add_noise(p, dt);
     shift(belief.x, dt);
   }
@@ -84,29 +74,27 @@ struct ConstantVelocity : ProcessModel<ConstantVelocity<Scalar_>, Scalar_, 6> {
   }
 
  private:
+  using Motion = WhiteAcceleration<Scalar, 2>;
+
   /// What is left of the acceleration: nothing, but all of it where no time passes.
   static Scalar memory(Scalar dt) { return Scalar(dt > Scalar(0) ? 0 : 1); }
 
   template <class Value>
   static AUVEST_INLINE void shift(Vector<Value, 6>& x, Scalar dt) {
+    Motion::shift(x, dt);
     AUVEST_UNROLL
-    for (int i = 0; i < 2; ++i) {
-      x(i) = x(i) + dt * x(i + 2);
-      x(i + 4) = memory(dt) * x(i + 4);
-    }
+    for (int i = 4; i < 6; ++i) x(i) = memory(dt) * x(i);
   }
 
   template <class Value>
   AUVEST_INLINE void add_noise(Matrix<Value, 6, 6>& p, Scalar dt) const {
-    const Scalar vv = params.velocity * dt;
+    typename Motion::Params noise;
+    noise.velocity = params.velocity;
+    Motion(noise).add_noise(p, dt);
     const Scalar fresh = Scalar(1) - memory(dt);
     AUVEST_UNROLL
-    for (int i = 0; i < 2; ++i) {
-      p(i, i) = p(i, i) + vv * dt * dt / Scalar(3);
-      p(i + 2, i) = p(i + 2, i) + vv * dt / Scalar(2);
-      p(i + 2, i + 2) = p(i + 2, i + 2) + vv;
-      p(i + 4, i + 4) = p(i + 4, i + 4) +
-                        fresh * (params.sigma_acceleration_mps2 * params.sigma_acceleration_mps2);
+    for (int i = 4; i < 6; ++i) {
+      p(i, i) = p(i, i) + fresh * (params.sigma_acceleration_mps2 * params.sigma_acceleration_mps2);
     }
   }
 };

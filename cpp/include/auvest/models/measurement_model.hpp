@@ -19,9 +19,9 @@
 //                                 for the EKF: takes the mean of the second-order term of h, over
 //                                 the belief with P_oo = root root', off the innovation and adds
 //                                 its covariance to `noise`
-//     kPlace, place(p)            how many numbers say where the sensor stands (a station, a
-//     leader),
-//                                 and the setter: for records in which it moves
+//     kPlace, place(p)            how many numbers come with each measurement and are no part of it
+//                                 (where a station or a leader stood, how an instrument was
+//                                 headed), and their setter: for records in which they change
 //     near_field(point, P, z, innovation, noise)
 //                                 for a model with M = Observed: true where h is useless at the
 //                                 scale of the belief; the filter then takes the measurement as one

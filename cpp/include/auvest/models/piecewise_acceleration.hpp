@@ -49,9 +49,7 @@ struct PiecewiseAcceleration : ProcessModel<PiecewiseAcceleration<Scalar_>, Scal
   }
 
   Status check() const {
-    return math::is_finite(params.acceleration_mps2) && !(params.acceleration_mps2 < Scalar(0))
-               ? Status::kOk
-               : Status::kBadParameter;
+    return math::is_nonnegative(params.acceleration_mps2) ? Status::kOk : Status::kBadParameter;
   }
 
  private:

@@ -125,9 +125,8 @@ struct CompassMotion {
   }
 
   Status check() const {
-    const bool valid =
-        math::is_finite(params.sigma_speed_mps) && !(params.sigma_speed_mps < Scalar(0)) &&
-        !(params.sigma_heading_rad < Scalar(0)) && !(params.sigma_heading_rad > Scalar(3));
+    const bool valid = math::is_nonnegative(params.sigma_speed_mps) &&
+                       math::within(params.sigma_heading_rad, Scalar(0), Scalar(3));
     return valid ? Status::kOk : Status::kBadParameter;
   }
 };
@@ -236,9 +235,8 @@ struct UnicycleMotion {
   }
 
   Status check() const {
-    const bool valid =
-        math::is_finite(params.sigma_speed_mps) && math::is_finite(params.sigma_yaw_rate_radps) &&
-        !(params.sigma_speed_mps < Scalar(0)) && !(params.sigma_yaw_rate_radps < Scalar(0));
+    const bool valid = math::is_nonnegative(params.sigma_speed_mps) &&
+                       math::is_nonnegative(params.sigma_yaw_rate_radps);
     return valid ? Status::kOk : Status::kBadParameter;
   }
 };

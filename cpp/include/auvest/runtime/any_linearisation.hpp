@@ -1,8 +1,10 @@
-// How a Gaussian filter linearises, chosen at run time: the EKF's Jacobians or a UKF's points.
+// How a Gaussian filter linearises, chosen at run time: the EKF's Jacobians, a UKF's or a CKF's
+// points.
 #pragma once
 
 #include <cstdint>
 
+#include "auvest/filters/ckf.hpp"
 #include "auvest/filters/ekf.hpp"
 #include "auvest/filters/ukf.hpp"
 
@@ -11,13 +13,14 @@ namespace auvest {
 template <class Scalar_>
 struct AnyLinearisation {
   using Scalar = Scalar_;
-  enum class Kind : std::uint8_t { kEkf, kUkf };
+  enum class Kind : std::uint8_t { kEkf, kUkf, kCkf };
 
   Kind kind;
   SigmaPoints<Scalar> unscented;
+  CubaturePoints<Scalar> cubature;
 
   AnyLinearisation(Kind k, const typename SigmaPoints<Scalar>::Params& params, int states)
-      : kind(k), unscented(params, states) {}
+      : kind(k), unscented(params, states), cubature(states) {}
 
   Status check() const { return kind == Kind::kUkf ? unscented.status : Status::kOk; }
 
@@ -25,6 +28,9 @@ struct AnyLinearisation {
   Status predict(const Process& process, Belief<Scalar, N>& belief, Scalar dt) const {
     if (kind == Kind::kUkf) {
       return predict_by_points(unscented, process, belief, dt, IsLinear<Process::kLinear>());
+    }
+    if (kind == Kind::kCkf) {
+      return predict_by_points(cubature, process, belief, dt, IsLinear<Process::kLinear>());
     }
     process.propagate(belief, dt);
     return Status::kOk;
@@ -38,6 +44,9 @@ struct AnyLinearisation {
                    typename Model::Noise& noise) const {
     if (kind == Kind::kUkf) {
       return linearise_by_points(unscented, model, point, root, z, innovation, a, noise);
+    }
+    if (kind == Kind::kCkf) {
+      return linearise_by_points(cubature, model, point, root, z, innovation, a, noise);
     }
     linearise_by_jacobian(model, point, root, z, innovation, a, noise);
     return Status::kOk;

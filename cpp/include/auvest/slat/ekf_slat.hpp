@@ -43,7 +43,7 @@ class EkfSlat {
 
   /// Only the lower triangle of pose.P is read; it may be singular. There is no master yet.
   Status reset(const SlaveBelief& pose, math::Random&) {
-    if (model_.check() != Status::kOk || !(params_.gate >= Scalar(0))) {
+    if (model_.check() != Status::kOk || !math::is_nonnegative(params_.gate)) {
       return Status::kBadParameter;
     }
     if (!math::all_finite(pose.x) || !math::lower_finite(pose.P)) return Status::kNotFinite;

@@ -151,7 +151,7 @@ class EkfSlat<Motion_, Imm<Models...>, Masters> {
 
   Status reset(const SlaveBelief& pose, math::Random&) {
     if (motion_.check() != Status::kOk || master_.check() != Status::kOk ||
-        !(params_.gate >= Scalar(0))) {
+        !math::is_nonnegative(params_.gate)) {
       return Status::kBadParameter;
     }
     if (!math::all_finite(pose.x) || !math::lower_finite(pose.P)) return Status::kNotFinite;

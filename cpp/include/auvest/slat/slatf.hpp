@@ -99,11 +99,12 @@ class Slatf {
   /// Draws the poses of `particles` particles from N(pose.x, pose.P); there is no master yet. P may
   /// be singular or zero.
   Status reset(const SlaveBelief& pose, int particles, math::Random& random) {
-    const bool valid =
-        particles > 0 && particles <= set_.capacity() && !(params_.resample_below < Scalar(0)) &&
-        !(params_.gate < Scalar(0)) && !(params_.birth_velocity_mps < Scalar(0)) &&
-        params_.birth_acceleration_mps2 > Scalar(0) && (params_.gate > Scalar(0) || !births()) &&
-        !(params_.resample_below > Scalar(1));
+    const bool valid = particles > 0 && particles <= set_.capacity() &&
+                       math::within(params_.resample_below, Scalar(0), Scalar(1)) &&
+                       math::is_nonnegative(params_.gate) &&
+                       math::is_nonnegative(params_.birth_velocity_mps) &&
+                       math::is_positive(params_.birth_acceleration_mps2) &&
+                       (params_.gate > Scalar(0) || !births());
     if (!valid || motion_.check() != Status::kOk || master_.check() != Status::kOk) {
       return Status::kBadParameter;
     }

@@ -88,7 +88,7 @@ class SlatfJoint {
   Status reset(const SlaveBelief& pose, int particles, math::Random&) {
     const bool valid = particles > 0 && particles <= set_.capacity() &&
                        is_share(params_.resample_below) && is_share(params_.kept) &&
-                       !(params_.gate < Scalar(0));
+                       math::is_nonnegative(params_.gate);
     if (!valid || model_.check() != Status::kOk) {
       return Status::kBadParameter;
     }

@@ -1,0 +1,67 @@
+"""Velocity over ground in the axes of the vehicle: a Doppler log (DVL) as a measurement."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from auvest import _core
+from auvest._arguments import as_integer
+from auvest.models._base import MeasurementModel
+
+_DEFAULTS = _core.sensor_defaults("BodyVelocity3")
+
+
+@dataclass(frozen=True, kw_only=True)
+class BodyVelocity(MeasurementModel):
+    """Velocity over ground, forward, sideways and (3 axes) along z, m/s, with pitch and roll out.
+
+    For processes whose state is position, then velocity. Sideways is 90 degrees from forward, from
+    +x towards +y.
+
+    Parameters
+    ----------
+    axes : {2, 3}
+        In the plane or in space.
+    heading_rad : float
+        From +x towards +y, when it was measured; ``place`` in ``update`` and ``run`` replaces it.
+    sigma_forward_m_s, sigma_sideways_m_s, sigma_vertical_m_s : float
+        Standard deviations, m/s, positive. An error of the heading turns the velocity: add it,
+        times the speed, in squares to ``sigma_sideways_m_s``.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If an argument lies outside its range.
+    """
+
+    structural = ("axes",)
+    place = "heading_rad"
+
+    axes: Literal[2, 3] = 2
+    heading_rad: float = _DEFAULTS["heading_rad"]
+    sigma_forward_m_s: float = _DEFAULTS["sigma_forward_m_s"]
+    sigma_sideways_m_s: float = _DEFAULTS["sigma_sideways_m_s"]
+    sigma_vertical_m_s: float = _DEFAULTS["sigma_vertical_m_s"]
+
+    def __post_init__(self) -> None:
+        as_integer("axes", self.axes, 2, 3)
+        self._set_numbers("any", "heading_rad")
+        names = ("sigma_forward_m_s", "sigma_sideways_m_s", "sigma_vertical_m_s")
+        self._set_numbers("positive", *names)
+
+    @property
+    def observes(self) -> tuple[str, ...]:  # type: ignore[override]
+        """Position (which it does not see) and velocity."""
+        names = "xyz"[: self.axes]
+        return (*(f"{i}_m" for i in names), *(f"v{i}_m_s" for i in names))
+
+    @property
+    def measures(self) -> tuple[str, ...]:  # type: ignore[override]
+        """In the vehicle's axes."""
+        return ("forward_m_s", "sideways_m_s", "vertical_m_s")[: self.axes]
+
+    @property
+    def core_name(self) -> str:
+        """One class of the core per number of axes."""
+        return f"BodyVelocity{self.axes}"

@@ -1,0 +1,73 @@
+"""The bits of before: what a change of structure must leave as it was.
+
+``golden.json`` has the SHA-256 of each record and of its trace in Python, as they were when the
+filters were first carried to the targets; the other tests here say that all targets have Python's
+bits. A change that means to change bits says so by writing the file anew:
+
+    python -m tests.parity.test_golden
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from firmware.parity.slatf import Record as SlatfRecord
+from tests.parity import python_leg, records, robust_records, slatf_python_leg
+
+FILE = Path(__file__).with_name("golden.json")
+GOLDEN: dict[str, list[str]] = json.loads(FILE.read_text(encoding="utf-8"))
+PARTICLES = 100
+
+
+def digest(*arrays: np.ndarray | bytes) -> str:
+    total = hashlib.sha256()
+    for array in arrays:
+        total.update(array if isinstance(array, bytes) else np.ascontiguousarray(array).tobytes())
+    return total.hexdigest()
+
+
+def all_traces() -> dict[str, Callable[[], list[str]]]:
+    """By name: a function that gives the digests of a record and of its trace."""
+    found: dict[str, Callable[[], list[str]]] = {}
+    for record in records.all_records():
+        found[f"gaussian/{record.name}"] = lambda r=record: [
+            digest(r.to_bytes()),
+            digest(python_leg.replay_in_python(r)),
+        ]
+    for record in robust_records.all_records():
+        found[f"robust/{record.name}"] = lambda r=record: [
+            digest(r.to_bytes()),
+            digest(r.replay_in_python()),
+        ]
+    for kind in ("slatf1", "slatf2"):
+        record = SlatfRecord(kind, PARTICLES)
+        found[f"slat/{kind}"] = lambda r=record: [
+            digest(r.to_bytes()),
+            digest(*slatf_python_leg.replay_in_python(r, "scalar")),
+        ]
+    return found
+
+
+TRACES = all_traces()
+
+
+@pytest.mark.parametrize("name", GOLDEN)
+def test_the_bits_are_those_of_before(name):
+    record, trace = TRACES[name]()
+    assert record == GOLDEN[name][0], "the record itself has changed"
+    assert trace == GOLDEN[name][1]
+
+
+def test_every_record_has_its_bits_stored():
+    assert sorted(TRACES) == sorted(GOLDEN)
+
+
+if __name__ == "__main__":
+    now = {name: trace() for name, trace in sorted(TRACES.items())}
+    FILE.write_text(json.dumps(now, indent=1) + "\n", encoding="utf-8")

@@ -1,0 +1,152 @@
+"""Importers: made-up recordings in the format of each set, and the log by hand."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from auvest.logs import LogFolder
+from auvest.logs.importers import IMPORTERS
+
+
+def recording(folder: Path, files: dict[str, str]) -> Path:
+    folder.mkdir()
+    for name, text in files.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    return folder
+
+
+def imported(folder: Path, name: str, files: dict[str, str]) -> dict[str, LogFolder]:
+    folders = IMPORTERS[name](recording(folder / "set", files), folder / "logs")
+    return {path.name: LogFolder(path) for path in folders}
+
+
+def whole(log: LogFolder, name: str) -> list[list[float]]:
+    rows: list[list[float]] = log[name].whole().tolist()
+    return rows
+
+
+def goats(heading: float) -> dict[str, str]:
+    """Half a metre along the vehicle's +y, its forward axis, and a quarter to its +x, starboard."""
+    return {
+        "odometry.csv": "t,dx_body,dy_body,dtheta\n1.0,0.25,0.5,0.125\n2.0,-0.75,1.5,-0.5\n",
+        "ranges.csv": "t,beacon,range\n1.5,3,40.5\n",
+        "beacons.csv": "beacon,x,y\n3,10.0,-20.0\n",
+        "reference_batch.csv": "t,x,y\n0.5,7.0,8.0\n1.5,7.5,9.0\n",
+        "groundtruth.csv": f"t,theta\n0.5,{heading}\n1.5,9.0\n",
+    }
+
+
+def test_goats14_turns_the_body_to_forward_and_left(tmp_path: Path) -> None:
+    log = imported(tmp_path, "goats14", goats(0.25))["goats14"]
+    # time, forward = dy_body, left = -dx_body, turn
+    assert whole(log, "odometry.csv") == [[1.0, 0.5, -0.25, 0.125], [2.0, 1.5, 0.75, -0.5]]
+    assert whole(log, "ranges.csv") == [[1.5, 3, 40.5]]
+    assert log.beacons() == {3: (10.0, -20.0)}
+    assert whole(log, "truth.csv") == [[0.5, 7.0, 8.0], [1.5, 7.5, 9.0]]
+
+
+@pytest.mark.parametrize(
+    ("of_x_axis", "forward"),
+    [
+        (0.25, 0.25 + math.pi / 2),
+        (2.0, 2.0 + math.pi / 2 - 2 * math.pi),  # wrapped
+        (-math.pi, -math.pi / 2),
+    ],
+)
+def test_goats14_starts_with_the_heading_of_the_forward_axis(
+    tmp_path: Path, of_x_axis: float, forward: float
+) -> None:
+    """The INS tells the direction of the body's +x; +y, forward, stands a quarter turn left."""
+    log = imported(tmp_path, "goats14", goats(of_x_axis))["goats14"]
+    (start,) = whole(log, "start.csv")
+    assert start[:3] == [0.5, 7.0, 8.0]  # the first of the reference
+    assert start[3] == pytest.approx(forward, abs=1e-12)
+
+
+def test_hat_charles_tells_sigma_and_leaves_out_what_is_stale(tmp_path: Path) -> None:
+    """A variance of 4 m^2 is 2 m. A message is stale if range and both coordinates repeat."""
+    files = {
+        "odometry.csv": "t,dx_body,dy_body,dtheta\n1.0,0.5,-0.25,0.125\n",
+        "leader_ranges.csv": (
+            "t,leader_x,leader_y,leader_pos_var,range\n"
+            "1.0,10.0,20.0,4.0,30.0\n"
+            "2.0,10.0,20.0,9.0,30.0\n"  # stale, whatever its variance
+            "3.0,10.0,20.0,2.25,31.0\n"
+            "4.0,10.0,21.0,0.0,31.0\n"
+            "5.0,11.0,21.0,0.25,31.0\n"
+        ),
+        "groundtruth.csv": "t,x,y,theta\n0.0,1.0,2.0,0.5\n",
+    }
+    log = imported(tmp_path, "hat_charles", files)["hat_charles"]
+    assert whole(log, "odometry.csv") == [[1.0, 0.5, -0.25, 0.125]]
+    assert whole(log, "ranges.csv") == [[1, 1, 30], [3, 1, 31], [4, 1, 31], [5, 1, 31]]
+    assert whole(log, "leaders.csv") == [
+        [1, 1, 10, 20, 2.0],
+        [3, 1, 10, 20, 1.5],
+        [4, 1, 10, 21, 0.0],
+        [5, 1, 11, 21, 0.5],
+    ]
+    np.testing.assert_allclose(whole(log, "truth.csv"), [[0.0, 1.0, 2.0, 0.5]], rtol=1e-15)
+
+
+def test_labyrinth_uwb_starts_at_the_truth_and_names_each_module_once(tmp_path: Path) -> None:
+    files = {
+        "ranges.csv": (
+            "t,module,range,module_x,module_y\n"
+            "1.0,2,5.0,10.0,0.0\n1.5,1,6.0,0.0,10.0\n2.0,2,5.5,10.0,0.0\n"
+        ),
+        "odometry.csv": "t,v,w\n0.5,0.25,-0.125\n",
+        "groundtruth.csv": "t,x,y\n0.75,3.0,4.0\n1.75,3.5,4.5\n",
+        "initial_heading.txt": "0.5\n",
+    }
+    log = imported(tmp_path, "labyrinth_uwb", files)["labyrinth_uwb"]
+    assert whole(log, "odometry.csv") == [[0.5, 0.25, -0.125]]
+    assert whole(log, "ranges.csv") == [[1.0, 2, 5.0], [1.5, 1, 6.0], [2.0, 2, 5.5]]
+    assert whole(log, "beacons.csv") == [[1, 0.0, 10.0], [2, 10.0, 0.0]]
+    np.testing.assert_allclose(whole(log, "start.csv"), [[0.75, 3.0, 4.0, 0.5]], rtol=1e-15)
+
+
+def test_mrclam6_makes_each_robot_the_slave_of_the_others(tmp_path: Path) -> None:
+    """Who sees is as good as who is seen; what sees itself, or is no robot, is left out."""
+    files = {
+        "sightings.csv": (
+            "t,observer,subject,range\n"
+            "3.0,1,2,5.0\n1.0,2,1,6.0\n2.0,1,7,9.0\n2.5,3,1,7.0\n2.75,1,1,0.5\n"
+        ),
+        "odometry.csv": "robot,t,v,w\n1,0.5,0.25,0.125\n2,0.5,0.75,0.0\n3,0.5,0.0,0.0\n",
+        "groundtruth.csv": (
+            "robot,t,x,y,theta\n1,0.0,1.0,1.5,0.25\n2,0.0,2.0,2.5,0.5\n2,1.0,2.0,3.5,0.5\n"
+            "3,0.5,3.0,3.5,0.0\n"
+        ),
+    }
+    logs = imported(tmp_path, "mrclam6", files)
+    assert list(logs) == ["robot1", "robot2", "robot3"]
+    # In the order of time: robot 2 sees robot 1, robot 3 sees robot 1, robot 1 sees robot 2.
+    assert whole(logs["robot1"], "ranges.csv") == [[1.0, 2, 6.0], [2.5, 3, 7.0], [3.0, 2, 5.0]]
+    assert whole(logs["robot2"], "ranges.csv") == [[1.0, 1, 6.0], [3.0, 1, 5.0]]
+    assert whole(logs["robot3"], "ranges.csv") == [[2.5, 1, 7.0]]
+    assert whole(logs["robot1"], "leaders.csv") == [
+        [0.0, 2, 2.0, 2.5],
+        [0.5, 3, 3.0, 3.5],
+        [1.0, 2, 2.0, 3.5],
+    ]
+    assert whole(logs["robot1"], "odometry.csv") == [[0.5, 0.25, 0.125]]
+    np.testing.assert_allclose(whole(logs["robot1"], "truth.csv"), [[0, 1, 1.5, 0.25]], rtol=1e-15)
+
+
+def test_ugps_pier59_leaves_out_polls_without_a_fix(tmp_path: Path) -> None:
+    """Forward is +x and starboard +y: a fix 3 m ahead and 4 m to port is 5 m off."""
+    text = "t,valid,x_fwd,y_stbd\n0.0,1,3.0,-4.0\n0.5,0,3.0,4.0\n1.0,1,0.0,2.0\n"
+    logs = imported(tmp_path, "ugps_pier59", {"fixes_1.csv": text, "fixes_2.csv": text})
+    assert list(logs) == ["ugps_pier59_1", "ugps_pier59_2"]
+    for log in logs.values():
+        np.testing.assert_allclose(
+            whole(log, "fixes.csv"),
+            [[0.0, 0, 5.0, -math.acos(0.6)], [1.0, 0, 2.0, math.pi / 2]],
+            rtol=1e-15,
+        )
+        assert log.beacons() == {0: (0.0, 0.0)}

@@ -1,0 +1,194 @@
+"""Figures and words of a replay: what is drawn is what was measured."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+
+from auvest.logs import LogFolder
+from auvest.logs.write import write_file
+from auvest.replay import Result, Settings, figures, replay, report, tables
+from auvest.replay.samples import Samples
+
+NAN = math.nan
+
+
+@pytest.fixture
+def result(tmp_path: Path) -> Result:
+    """Something to fill with made-up numbers."""
+    for name, columns in (
+        ("fixes.csv", {"time_s": [1.0], "source": [0], "range_m": [9.0], "bearing_rad": [0.0]}),
+        ("beacons.csv", {"source": [0], "x_m": [0.0], "y_m": [0.0]}),
+    ):
+        write_file(tmp_path, name, **columns)
+    return replay(LogFolder(tmp_path), Settings())
+
+
+def samples(names: tuple[str, ...], rows: int, **columns: list[Any]) -> Samples:
+    table: dict[str, Any] = {name: np.full(rows, NAN) for name in names}
+    table |= {"time_s": np.arange(float(rows)), "near_field": np.zeros(rows, bool)}
+    if "outcome" in names:
+        table["outcome"] = np.full(rows, tables.ACCEPTED, "U12")
+    table |= {name: np.array(values) for name, values in columns.items()}
+    made = Samples(names)
+    made.add(table)
+    return made
+
+
+def measured(result: Result, **columns: list[Any]) -> Result:
+    rows = len(next(iter(columns.values())))
+    made = samples(tables.MEASUREMENTS, rows, **columns)
+    doubted = Samples(tables.MEASUREMENTS)
+    full = made.columns()
+    away = np.isin(full["outcome"], (tables.DOWNWEIGHTED, tables.REJECTED))
+    doubted.add({name: values[away] for name, values in full.items()})
+    return replace(result, measurements=made, outliers=doubted)
+
+
+def curve(axes: Axes, label: str) -> tuple[list[float], list[float]]:
+    (line,) = [one for one in axes.get_lines() if str(one.get_label()).startswith(label)]
+    x, y = np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
+    return x.tolist(), y.tolist()
+
+
+def test_the_nis_is_drawn_with_its_one_sided_bound(result: Result) -> None:
+    """95 % of a squared normal deviate are below 1.959964^2, of two below -2 ln 0.05."""
+    ranges = measured(result, nis=[1.0, 2.0], innovation_0=[1.0, 1.0])
+    (axes,) = figures.nis(ranges).axes
+    assert curve(axes, "95 %")[1] == pytest.approx([1.959964**2] * 2, rel=1e-6)
+    assert curve(axes, "NIS") == ([0.0, 1.0], [1.0, 2.0])
+    fixes = measured(result, nis=[1.0, 2.0], innovation_1=[NAN, 0.1])
+    (axes,) = figures.nis(fixes).axes
+    assert curve(axes, "95 %")[1] == pytest.approx([-2 * math.log(0.05)] * 2, rel=1e-12)
+
+
+def test_the_error_is_drawn_with_three_sigma(result: Result) -> None:
+    errors = samples(
+        tables.ERRORS, 2, error_x_m=[1.0, -1.0], error_y_m=[2.0, 3.0], sigma_x_m=[0.5, 1.0],
+        sigma_y_m=[2.0, 4.0],
+    )  # fmt: skip
+    x, y = figures.errors(replace(result, errors=errors)).axes
+    assert curve(x, "error")[1] == [1.0, -1.0]
+    assert curve(y, "error")[1] == [2.0, 3.0]
+    for axes, bound in ((x, 3.0), (y, 12.0)):
+        (band,) = axes.collections
+        assert band.get_datalim(axes.transData).ymax == pytest.approx(bound)
+        assert band.get_datalim(axes.transData).ymin == pytest.approx(-bound)
+
+
+def test_innovations_near_the_station_are_not_drawn(result: Result) -> None:
+    """There they are errors of a position, in metres along x and y."""
+    filled = measured(
+        result,
+        innovation_0=[0.5, 9.0, -0.25],
+        innovation_1=[0.01, 9.0, 0.02],
+        sigma_0=[1.0, 1.0, 2.0],
+        sigma_1=[0.1, 1.0, 0.2],
+        near_field=[False, True, False],
+        outcome=[tables.ACCEPTED, tables.ACCEPTED, tables.REJECTED],
+    )
+    along, across = figures.innovations(filled).axes
+    assert curve(along, "innovation") == ([0.0, 2.0], [0.5, -0.25])
+    assert curve(across, "innovation") == ([0.0, 2.0], [0.01, 0.02])
+    assert curve(along, "rejected") == ([2.0], [-0.25])
+    (band,) = along.collections
+    assert band.get_datalim(along.transData).ymax == pytest.approx(6.0)
+    assert along.get_yscale() == "linear"
+
+
+def test_gross_errors_do_not_flatten_the_rest(result: Result) -> None:
+    """The axis is logarithmic beyond four bounds of three sigma, if something is beyond eight."""
+    columns = {"sigma_0": [1.0] * 4}
+    near = measured(result, innovation_0=[0.1, 0.2, 0.3, 23.9], **columns)
+    far = measured(result, innovation_0=[0.1, 0.2, 0.3, -24.1], **columns)
+    assert figures.innovations(near).axes[0].get_yscale() == "linear"
+    assert figures.innovations(far).axes[0].get_yscale() == "symlog"
+
+
+def test_weights_are_those_of_the_worse_number(result: Result) -> None:
+    filled = measured(
+        result,
+        weight_0=[1.0, 0.75, 0.5, 0.0],
+        weight_1=[1.0, 0.25, NAN, 0.0],
+        outcome=[tables.ACCEPTED, tables.DOWNWEIGHTED, tables.DOWNWEIGHTED, tables.REJECTED],
+    )
+    (axes,) = figures.weights(filled).axes
+    assert curve(axes, "downweighted") == ([1.0, 2.0], [0.25, 0.5])
+    assert curve(axes, "rejected") == ([3.0], [0.0])
+    assert curve(axes, "weight") == ([0.0, 1.0, 2.0, 3.0], [1.0, 0.75, 0.5, 0.0])
+
+
+NUMBERS: dict[str, Any] = {
+    "first_s": 1.25,
+    "last_s": 20.0,
+    "estimates": 7,
+    "measurements": 28,
+    "accepted": 1,
+    "downweighted": 2,
+    "rejected": 3,
+    "held_out": 4,
+    "before_start": 5,
+    "after_end": 6,
+    "no_position": 7,
+    "recovered": 8,
+    "near_field": 9,
+    "rmse_m": 0.12345,
+    "max_error_m": 1.5,
+    "dead_reckoned_rmse_m": 2.25,
+    "inside_3_sigma": 0.9875,
+    "truth": 80,
+    "held_out_rmse_m": 0.75,
+    "nis_mean": 1.25,
+    "nis_bounds_95": [0.5, 1.75],
+    "late": {
+        "ranges.csv": {"reordered": 1, "dropped": 5, "lines": [2, 3, 4, 5, 6]},
+        "truth.csv": {"reordered": 2, "dropped": 6, "lines": [2, 3, 4, 5, 6]},
+        "odometry.csv": {"reordered": 3, "dropped": 0, "lines": []},
+    },
+}
+
+
+def test_figures_in_words(result: Result) -> None:
+    assert dict(report.rows(replace(result, numbers=NUMBERS))) == {
+        "time": "1.2 to 20.0 s",
+        "measurements": "28",
+        "accepted": "1",
+        "downweighted": "2",
+        "rejected": "3",
+        "held out": "4",
+        "recoveries from lock-out": "8",
+        "taken as positions (near field)": "9",
+        "late lines put in order": "6",
+        "late lines not used": "11",
+        "position RMSE": "0.123 m",
+        "largest error": "1.500 m",
+        "dead reckoning alone, RMSE": "2.250 m",
+        "truth within 3 sigma": "98.8 %",
+        "held-out measurements, RMSE": "0.750 m",
+        "NIS, mean": "1.250 (consistent: 0.500 to 1.750)",
+    }
+    # What is not known has no row.
+    unknown = {**NUMBERS, "rmse_m": None, "nis_mean": None, "inside_3_sigma": None}
+    names = dict(report.rows(replace(result, numbers=unknown)))
+    assert not {"position RMSE", "NIS, mean", "truth within 3 sigma"} & set(names)
+
+
+def test_what_was_not_used_in_words(result: Result) -> None:
+    found = report.warnings(replace(result, numbers=NUMBERS, interrupted=True))
+    assert found == [
+        "The run was interrupted; this is what was done until then.",
+        "ranges.csv: 5 not used, later than the window of 0 s allows (line 2, 3, 4, 5, 6).",
+        "truth.csv: 6 not used, later than the window of 0 s allows (line 2, 3, 4, 5, 6 ...).",
+        "Measurements: 5 not used, taken before the start of the run.",
+        "Measurements: 6 not used, taken after the last line of the odometry.",
+        "Measurements: 7 not used, the position of the source is not known at that time.",
+    ]
+    document = replace(result, numbers=NUMBERS, interrupted=True).document()
+    assert document["interrupted"] is True
+    assert document["filter"] == "ukf"
