@@ -389,7 +389,7 @@ def failed(f, rows):
 
 SITUATIONS = {
     "fresh": ({}, lambda *_: None),
-    "under way": ({}, lambda f, rows: rows[:20].drive(f)),
+    "under way": ({}, lambda f, rows: rows[:19].drive(f)),
     "after an error": ({}, failed),
     "streak": (
         {"kernel": "igg", "recovery": auvest.RejectionStreak(rejections=2)},
