@@ -62,7 +62,8 @@ bool read_numbers(const py::handle& object, Scalar* values, int size) {
     }
     return true;
   }
-  if (!py::isinstance<py::array>(object)) return false;
+  // Exactly an array: a masked one would hide what its mask says.
+  if (Py_TYPE(given) != py::detail::npy_api::get().PyArray_Type_) return false;
   const auto array = py::reinterpret_borrow<py::array>(object);
   if (array.ndim() != 1 || array.shape(0) != size) return false;
   const char kind = array.dtype().kind();
@@ -148,6 +149,7 @@ py::array_t<Scalar> vector(const Scalar* values, int size) {
 /// What the last update reported as a dict; None if nothing was measured.
 template <class Scalar>
 py::object report(const FilterHandle<Scalar>& handle) {
+  require_idle(handle);
   const auto& r = handle.report;
   if (r.size == 0) return py::none();
   py::dict result;
@@ -340,6 +342,7 @@ desk::FilterOptions<Scalar> to_options(const py::dict& given, const AnyKernel<Sc
 
 template <class Scalar>
 py::object law(const FilterHandle<Scalar>& handle) {
+  require_idle(handle);
   const auto& policy = handle.filter->policy();
   if (policy.kind != AnyInterval<Scalar>::Kind::kMahalanobis) return py::none();
   const auto& m = policy.mahalanobis.memory;
@@ -478,6 +481,7 @@ void bind_precision(py::module_& m) {
       .def_readonly("status", &Filter::status)
       .def_property_readonly("nis",
                              [](const Filter& f) {
+                               require_idle(f);
                                return f.report.size > 0 ? f.report.nis
                                                         : std::numeric_limits<Scalar>::quiet_NaN();
                              })

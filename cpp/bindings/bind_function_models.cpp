@@ -1,5 +1,5 @@
-// Models written in Python. A function that raises leaves its exception here and NaN in the core,
-// which refuses the step; the Python layer then raises what the function raised.
+// Models written in Python. What a function raises goes to `keep`, and NaN to the core, which refuses
+// the step; the Python layer then raises what the function raised.
 #include <pybind11/stl.h>
 
 #include "desk/function_models.hpp"
@@ -21,16 +21,15 @@ std::shared_ptr<py::object> shared(const py::object& object) {
           }};
 }
 
-/// Calls `function` with these arguments and copies its numbers, all finite, to `out`; NaN where it
-/// fails, with the exception in `raised`.
+/// Copies the numbers that `function` gives to `out`; NaN where it fails, with the exception to
+/// `keep`.
 template <class Call>
-void call(py::list raised, double* out, std::vector<py::ssize_t> shape, const char* name,
+void call(const py::object& keep, double* out, std::vector<py::ssize_t> shape, const char* name,
           Call function) {
   py::ssize_t size = 1;
   for (const py::ssize_t extent : shape) size *= extent;
   try {
-    const auto given = Numbers::ensure(function());
-    if (!given) throw py::error_already_set();
+    const Numbers given(function());
     std::vector<py::ssize_t> have(given.shape(), given.shape() + given.ndim());
     if (have.empty() && size == 1) have = shape;  // one number may stand for itself
     if (have != shape) {
@@ -44,10 +43,9 @@ void call(py::list raised, double* out, std::vector<py::ssize_t> shape, const ch
     std::copy_n(given.data(), size, out);
     return;
   } catch (py::error_already_set& error) {
-    if (raised.size() == 0) raised.append(error.value());
+    keep(error.value());
   } catch (const py::value_error& error) {
-    if (raised.size() == 0)
-      raised.append(py::module_::import("builtins").attr("ValueError")(error.what()));
+    keep(py::module_::import("builtins").attr("ValueError")(error.what()));
   }
   std::fill_n(out, size, std::numeric_limits<double>::quiet_NaN());
 }
@@ -58,14 +56,14 @@ py::array_t<double> vector(const double* values, py::ssize_t size) {
 
 std::shared_ptr<Process> make_process(int states, int inputs, const py::object& f,
                                       const py::object& q, const py::object& jacobian,
-                                      const std::vector<int>& angles, const py::list& raised_list) {
+                                      const std::vector<int>& angles, const py::object& keep_raised) {
   const py::ssize_t n = states;
-  const auto raised = shared(raised_list);
-  const auto driven = [n, inputs, raised](const std::shared_ptr<py::object>& function,
+  const auto keep = shared(keep_raised);
+  const auto driven = [n, inputs, keep](const std::shared_ptr<py::object>& function,
                                           std::vector<py::ssize_t> shape, const char* name) {
     return [=](const double* x, double dt, const double* input, double* out) {
       const py::gil_scoped_acquire acquire;
-      call(py::list(*raised), out, shape, name, [&]() -> py::object {
+      call(*keep, out, shape, name, [&]() -> py::object {
         if (inputs == 0) return (*function)(vector(x, n), dt);
         return (*function)(vector(x, n), dt, vector(input, inputs));
       });
@@ -76,9 +74,9 @@ std::shared_ptr<Process> make_process(int states, int inputs, const py::object& 
   functions.f = driven(shared(f), {n}, "f");
   if (!jacobian.is_none()) functions.Phi = driven(shared(jacobian), {n, n}, "jacobian");
   const auto noise = shared(q);
-  functions.Q = [noise, n, raised](double dt, const double*, double* out) {
+  functions.Q = [noise, n, keep](double dt, const double*, double* out) {
     const py::gil_scoped_acquire acquire;
-    call(py::list(*raised), out, {n, n}, "Q", [&]() -> py::object { return (*noise)(dt); });
+    call(*keep, out, {n, n}, "Q", [&]() -> py::object { return (*noise)(dt); });
   };
   for (const int i : angles) functions.angle.at(static_cast<std::size_t>(i)) = true;
   return std::const_pointer_cast<Process>(desk::function_process(states, functions));
@@ -87,14 +85,14 @@ std::shared_ptr<Process> make_process(int states, int inputs, const py::object& 
 std::shared_ptr<Sensor> make_sensor(int states, int size, const py::object& h,
                                     const py::array_t<double, py::array::c_style>& r,
                                     const py::object& jacobian, const std::vector<int>& angles,
-                                    const py::list& raised_list) {
+                                    const py::object& keep_raised) {
   const py::ssize_t n = states;
-  const auto raised = shared(raised_list);
-  const auto at = [n, raised](const std::shared_ptr<py::object>& function,
+  const auto keep = shared(keep_raised);
+  const auto at = [n, keep](const std::shared_ptr<py::object>& function,
                               std::vector<py::ssize_t> shape, const char* name) {
     return [=](const double* x, double* out) {
       const py::gil_scoped_acquire acquire;
-      call(py::list(*raised), out, shape, name,
+      call(*keep, out, shape, name,
            [&]() -> py::object { return (*function)(vector(x, n)); });
     };
   };
@@ -113,9 +111,9 @@ void bind_function_models(py::module_& m) {
   m.attr("MAX_FUNCTION_STATES") = desk::kMaxFunctionStates;
   m.attr("MAX_FUNCTION_SIZE") = desk::kMaxFunctionSize;
   m.def("make_function_process", &make_process, py::arg("states"), py::arg("inputs"), py::arg("f"),
-        py::arg("Q"), py::arg("jacobian"), py::arg("angles"), py::arg("raised"));
+        py::arg("Q"), py::arg("jacobian"), py::arg("angles"), py::arg("keep"));
   m.def("make_function_sensor", &make_sensor, py::arg("states"), py::arg("size"), py::arg("h"),
-        py::arg("R").noconvert(), py::arg("jacobian"), py::arg("angles"), py::arg("raised"));
+        py::arg("R").noconvert(), py::arg("jacobian"), py::arg("angles"), py::arg("keep"));
 }
 
 }  // namespace bindings

@@ -124,7 +124,7 @@ def as_array(
     ``None`` in ``shape`` stands for any number of rows, at least one. Integers and other floats
     are converted; ``missing`` lets rows pass that are NaN throughout.
     """
-    raw = _as_real(name, value, shape)
+    raw = as_real(name, value, shape)
     _check_shape(name, raw, shape)
     with np.errstate(over="ignore"):
         array: Floats = np.ascontiguousarray(raw, dtype=dtype)
@@ -212,7 +212,8 @@ def _refuse_element(
     raise ValueError(f"{where} is {element}; all elements must be finite")
 
 
-def _as_real(name: str, value: object, shape: tuple[int | None, ...]) -> npt.NDArray[Any]:
+def as_real(name: str, value: object, shape: tuple[int | None, ...]) -> npt.NDArray[Any]:
+    """Take real numbers, finite or not; ``shape`` is only for the message."""
     expected = f"an array of shape {_shape(shape)}"
     if value is None:
         raise TypeError(f"{name} must be {expected}, not None")

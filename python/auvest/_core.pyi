@@ -1,4 +1,4 @@
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, Generic, TypeAlias, TypedDict, TypeVar
 
 import numpy as np
@@ -153,7 +153,7 @@ def make_function_process(
     Q: object,
     jacobian: object,
     angles: Sequence[int],
-    raised: list[BaseException],
+    keep: Callable[[BaseException], None],
 ) -> Process_float64: ...
 def make_function_sensor(
     states: int,
@@ -162,7 +162,7 @@ def make_function_sensor(
     R: _F64,
     jacobian: object,
     angles: Sequence[int],
-    raised: list[BaseException],
+    keep: Callable[[BaseException], None],
 ) -> Sensor_float64: ...
 
 class _FilterOptions(TypedDict):

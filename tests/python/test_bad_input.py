@@ -10,7 +10,7 @@ from decimal import Decimal
 
 import numpy as np
 import pytest
-from filter_support import everything, make, measure, straight
+from filter_support import PAPER, everything, make, measure, straight
 
 import auvest
 
@@ -30,7 +30,7 @@ def law(**options):
 
 def ukf(*args, **options):
     x0, p0 = args or (X0, P0)
-    return lambda: auvest.Ukf(x0, p0, **options)
+    return lambda: auvest.Ukf(x0, p0, **{**PAPER, **options})
 
 
 SKEW = changed(P0, (0, 1), 0.5)
@@ -119,13 +119,45 @@ CONSTRUCTORS = {
     "process": (
         ukf(process="exact"),
         TypeError,
-        r"process must be an auvest\.ConstantAcceleration, not str",
+        r"process must be an auvest\.ProcessModel, not str",
     ),
-    "measurement": (ukf(sensors=None), TypeError, r"must be an auvest\.RangeBearing, not None"),
+    "process that measures": (
+        ukf(process=auvest.RangeBearing()),
+        TypeError,
+        r"process must be an auvest\.ProcessModel, not RangeBearing",
+    ),
+    "no process": (
+        lambda: auvest.Ukf(X0, P0),
+        TypeError,
+        "missing 1 required keyword-only argument: 'process'",
+    ),
+    "sensors": (
+        ukf(sensors=None),
+        TypeError,
+        "sensors must be a measurement model, a sequence of them or a dict of them by name, "
+        "not NoneType",
+    ),
+    "sensors str": (ukf(sensors="sonar"), TypeError, "sensors must be a measurement .*, not str"),
+    "a sensor": (
+        ukf(sensors=[auvest.RangeBearing(), auvest.ConstantAcceleration()]),
+        TypeError,
+        r"sensors\['ConstantAcceleration'\] must be an auvest\.MeasurementModel, "
+        "not ConstantAcceleration",
+    ),
+    "sensors by number": (
+        ukf(sensors={1: auvest.RangeBearing()}),
+        TypeError,
+        "the names of sensors must be str, not int",
+    ),
+    "sensors of one class": (
+        ukf(sensors=[auvest.RangeBearing(), auvest.RangeBearing(station=(1.0, 2.0))]),
+        ValueError,
+        "sensors has two RangeBearing; name them: sensors={'first': ",
+    ),
     "policy": (
         lambda: auvest.Aukf(X0, P0, policy=0.5),
         TypeError,
-        r"policy must be an auvest\.MahalanobisInterval or .*, not float",
+        r"policy must be an auvest\.FixedInterval or .*, not float",
     ),
     "reference": (
         lambda: auvest.Aukf(X0, P0, reference=[1, 2, 3]),
@@ -199,14 +231,24 @@ CONSTRUCTORS = {
         r"station\[0\] is inf",
     ),
     "h": (
-        lambda: auvest.RangeBearing().h(np.zeros((3, 5))),
+        lambda: auvest.RangeBearing().h(np.zeros((3, 1))),
         ValueError,
-        r"x has shape \(3, 5\), expected \(T, 6\)",
+        r"x has shape \(3, 1\), expected \(n,\) or \(K, n\) with n at least 2",
     ),
     "h column": (
         lambda: auvest.RangeBearing().h(np.zeros((6, 1))),
         ValueError,
-        r"x has shape \(6, 1\), expected \(6,\); row and column vectors are refused",
+        r"x has shape \(6, 1\), expected \(n,\) or \(K, n\) with n at least 2",
+    ),
+    "h 3-d": (
+        lambda: auvest.RangeBearing().h(np.zeros((2, 3, 6))),
+        ValueError,
+        r"x has shape \(2, 3, 6\), expected \(n,\) or \(K, n\)",
+    ),
+    "h number": (
+        lambda: auvest.RangeBearing().h(1.0),
+        ValueError,
+        r"x has shape \(\), expected \(n,\) or \(K, n\)",
     ),
     # interval policies
     "preset": (law(preset="fig3"), ValueError, "preset must be 'figure3' or 'table1', not 'fig3'"),
@@ -297,7 +339,44 @@ CALLS = {
     "station": (
         lambda f: f.update([1, 2], (0, 0)),
         TypeError,
-        r"measurement must be an auvest\.RangeBearing, not tuple",
+        r"sensor must be an auvest\.MeasurementModel, not tuple",
+    ),
+    "sensor name": (
+        lambda f: f.update([1, 2], "Sonar"),
+        ValueError,
+        "sensor must be 'RangeBearing', not 'Sonar'",
+    ),
+    "z masked": (
+        lambda f: f.update(np.ma.masked_array([4.0, -0.8], [True, False])),
+        TypeError,
+        r"z must be .*, not a masked array; use z\.filled\(np\.nan\)",
+    ),
+    "place short": (
+        lambda f: f.update([1, 2], place=[1.0]),
+        ValueError,
+        r"place has shape \(1,\), expected \(2,\)",
+    ),
+    "place NaN": (lambda f: f.update([1, 2], place=[1.0, NAN]), ValueError, r"place\[1\] is nan"),
+    "place str": (
+        lambda f: f.update([1, 2], place="xy"),
+        TypeError,
+        "place must be .*, not of str",
+    ),
+    "age negative": (
+        lambda f: f.update([1, 2], age_s=-0.5),
+        ValueError,
+        r"age_s must not be negative, not -0\.5",
+    ),
+    "age NaN": (lambda f: f.update([1, 2], age_s=NAN), ValueError, "age_s must be finite, not nan"),
+    "age str": (
+        lambda f: f.update([1, 2], age_s="1"),
+        TypeError,
+        "age_s must be a number, not str",
+    ),
+    "input": (
+        lambda f: f.predict(0.5, [1.0]),
+        TypeError,
+        "input must be None: ConstantAcceleration has no input",
     ),
     # run
     "run empty": (lambda f: f.run(np.zeros((0, 2)), dt=0.5), ValueError, r"z is empty: shape \(0"),
@@ -342,7 +421,47 @@ CALLS = {
     "run station": (
         lambda f: f.run(Z, dt=0.5, sensor=1),
         TypeError,
-        "measurement must be an",
+        "sensor must be a name, a model or a sequence of names, one per row",
+    ),
+    "run sensor name": (
+        lambda f: f.run(Z, dt=0.5, sensor=["RangeBearing"] * 7 + ["Sonar"]),
+        ValueError,
+        "sensor must be 'RangeBearing', not 'Sonar'",
+    ),
+    "run sensor length": (
+        lambda f: f.run(Z, dt=0.5, sensor=["RangeBearing"] * 7),
+        ValueError,
+        "sensor has 7 rows and z has 8; they must have the same",
+    ),
+    "run input": (
+        lambda f: f.run(Z, dt=0.5, input=np.ones((8, 1))),
+        TypeError,
+        "input must be None: ConstantAcceleration has no input",
+    ),
+    "run place shape": (
+        lambda f: f.run(Z, dt=0.5, place=np.ones((8, 3))),
+        ValueError,
+        r"place has shape \(8, 3\), expected \(T, 2\)",
+    ),
+    "run place length": (
+        lambda f: f.run(Z, dt=0.5, place=np.ones((7, 2))),
+        ValueError,
+        "place has 7 rows and z has 8; they must have the same",
+    ),
+    "run place half NaN": (
+        lambda f: f.run(Z, dt=0.5, place=changed(np.ones((8, 2)), (3, 1), NAN)),
+        ValueError,
+        r"place\[3, 1\] is nan",
+    ),
+    "run age length": (
+        lambda f: f.run(Z, dt=0.5, age_s=np.zeros(7)),
+        ValueError,
+        "age_s has 7 rows and z has 8; they must have the same",
+    ),
+    "run age negative": (
+        lambda f: f.run(Z, dt=0.5, age_s=changed(np.zeros(8), 5, -1.0)),
+        ValueError,
+        r"age_s\[5\] must not be negative, not -1\.0",
     ),
 }
 
@@ -401,21 +520,27 @@ def test_filters_without_an_interval_of_their_own_need_dt(kind):
         f.predict(None)
     with pytest.raises(TypeError, match="dt must be a number or an array"):
         f.run(Z, dt=None)
-    with pytest.raises(TypeError, match="missing 1 required keyword-only argument: 'dt'"):
+    with pytest.raises(TypeError, match="dt must be a number"):
+        f.predict()
+    with pytest.raises(TypeError, match="dt must be a number or an array"):
         f.run(Z)
+    with pytest.raises(TypeError, match="reference must be None: this filter has no interval"):
+        f.run(Z, dt=0.5, reference=Z)
+    with pytest.raises(AttributeError, match=r"feedback\(\) needs an interval policy; this filter"):
+        f.feedback()
     assert everything(f) == before
 
 
 def test_what_looks_odd_but_is_accepted():
-    f = auvest.Ukf([0] * 6, np.eye(6, dtype=int), kappa=-5.9)
+    f = auvest.Ukf([0] * 6, np.eye(6, dtype=int), **PAPER, kappa=-5.9)
     f.predict(0)
     f.predict(np.float32(0.5))
     f.predict(np.array(0.5))
     f.update((4, 7))  # a bearing of more than a turn is wrapped
-    g = auvest.Ukf([0.0] * 6, np.eye(6), kappa=-5.9)
+    g = auvest.Ukf([0.0] * 6, np.eye(6), **PAPER, kappa=-5.9)
     g.predict(0.5)
     g.predict(0.5)
     g.update([4.0, 7.0 - 2 * math.pi])
     assert f.x == pytest.approx(g.x, rel=1e-12)
     # An asymmetry of rounding is not refused.
-    auvest.Ukf(X0, changed(P0, (0, 1), 1e-9))
+    auvest.Ukf(X0, changed(P0, (0, 1), 1e-9), **PAPER)

@@ -6,6 +6,9 @@ from hypothesis import strategies as st
 
 import auvest
 
+PROCESS = auvest.ConstantAcceleration()
+SONAR = auvest.RangeBearing()
+
 METRES = st.floats(-500, 500)
 SIGMAS = st.floats(0.01, 10)
 ALPHAS = st.sampled_from([1.0, 1e-3, 1e-6])
@@ -26,7 +29,7 @@ def beliefs(draw):
 @given(beliefs(), st.floats(0.1, 600), st.floats(-3.14, 3.14), ALPHAS)
 def test_an_update_never_widens_the_belief(belief, range_m, bearing, alpha):
     """P of before minus P of after is positive semidefinite, whatever the measurement says."""
-    ukf = auvest.Ukf(*belief, alpha=alpha)
+    ukf = auvest.Ukf(*belief, process=PROCESS, sensors=SONAR, alpha=alpha)
     before = ukf.P
     ukf.update([range_m, bearing])
     assert ukf.nis >= 0
@@ -62,8 +65,8 @@ def test_turning_the_world_turns_the_estimate(belief, range_m, bearing, turn):
     c, s = np.cos(turn), np.sin(turn)
     rotation = np.kron(np.eye(3), [[c, -s], [s, c]])
     turned = rotation @ P0 @ rotation.T
-    a = auvest.Ekf(x0, P0, sensors=sonar)
-    b = auvest.Ekf(rotation @ x0, (turned + turned.T) / 2, sensors=sonar)
+    a = auvest.Ekf(x0, P0, process=PROCESS, sensors=sonar)
+    b = auvest.Ekf(rotation @ x0, (turned + turned.T) / 2, process=PROCESS, sensors=sonar)
     a.update([range_m, bearing])
     b.update([range_m, bearing + turn])
     assume(a.near_field == b.near_field)

@@ -127,10 +127,10 @@ def test_increments_and_ranges_are_those_of_the_filter_step_by_step(tmp_path: Pa
         ekf.predict(0.5, [log[name][k] for name in ("forward_m", "left_m", "turn_rad")])
         if log["used"][k]:
             leader = BEACONS[int(log["source"][k])]
-            report = ekf.update(log["range_m"][k], LeaderRange(leader=leader, sigma_range_m=0.3))
-            assert report is not None
-            nis.append(report.nis)
-            weight.append(report.weight[0])
+            ekf.update(log["range_m"][k], LeaderRange(leader=leader, sigma_range_m=0.3))
+            assert ekf.report is not None
+            nis.append(ekf.report.nis)
+            weight.append(ekf.report.weight[0])
         x.append(ekf.x)
         covariance.append(ekf.P)
     estimates, measured = tables["estimates"], tables["measurements"]

@@ -185,9 +185,7 @@ def test_float32_follows_float64(alpha, discretisation):
     x0 = [*(truth[0] + 3.0), 0.0, 3.0, 0.0, 0.0]
     p0 = np.diag([100.0, 100.0, 10.0, 10.0, 1.0, 1.0])
     single, double = (
-        auvest.Ukf(x0, p0, process=process, sensors=sensor, alpha=alpha, dtype=dtype).run(
-            z, dt=0.5
-        )
+        auvest.Ukf(x0, p0, process=process, sensors=sensor, alpha=alpha, dtype=dtype).run(z, dt=0.5)
         for dtype in ("float32", "float64")
     )
     # 2e-3 m is 33 ulp of a float32 coordinate of 650 m.

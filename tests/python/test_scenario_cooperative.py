@@ -173,8 +173,14 @@ def test_what_a_simulation_cannot_take_is_refused():
     f = auvest.RobustEkf([0, 0, 0], np.eye(3), process=auvest.Odometry())
     with pytest.raises(ValueError, match="filter must have a SpeedHeading of two states"):
         simulate(f)
-    with pytest.raises(TypeError, match=r"filter must be an auvest\.RobustEkf"):
-        simulate(auvest.Ekf(np.zeros(6), np.eye(6)))
+    f = auvest.Ekf(np.zeros(6), np.eye(6), process=auvest.ConstantAcceleration())
+    with pytest.raises(ValueError, match="filter must have a SpeedHeading of two states"):
+        simulate(f)
+    f = auvest.Ekf([0, 0], np.eye(2), process=auvest.SpeedHeading())
+    with pytest.raises(ValueError, match="filter must have one LeaderRange as its sensor, not "):
+        simulate(f)
+    with pytest.raises(TypeError, match=r"filter must be an auvest\.Ekf or auvest\.Ukf, not Slatf"):
+        simulate(auvest.Slatf([0, 0], np.eye(2)))
     with pytest.raises(ValueError, match=r"dropout must lie in 0\.\.1, not 1\.5"):
         Scenario(dropout=1.5)
     with pytest.raises(ValueError, match="timing must be 'at-once'"):

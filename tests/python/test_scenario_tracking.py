@@ -7,7 +7,7 @@ import threading
 
 import numpy as np
 import pytest
-from filter_support import everything, same_bits
+from filter_support import PAPER, everything, same_bits
 from result_support import tracking_result
 
 import auvest
@@ -25,7 +25,7 @@ def aukf(**options):
 
 
 def ukf(**options):
-    return auvest.Ukf(START, P0, **{"process": EULER, **options})
+    return auvest.Ukf(START, P0, **{**PAPER, "process": EULER, **options})
 
 
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
@@ -85,7 +85,7 @@ def test_time_is_the_sum_of_the_intervals():
 
 @pytest.mark.parametrize("kind", [auvest.Ekf, auvest.Ukf])
 def test_filters_without_a_law_use_the_interval_of_the_scenario(kind):
-    result = simulate(kind(START, P0), Scenario(runs=2, steps=10, interval_s=0.25))
+    result = simulate(kind(START, P0, **PAPER), Scenario(runs=2, steps=10, interval_s=0.25))
     assert result.time_s == pytest.approx(np.tile(0.25 * np.arange(1, 11), (2, 1)), rel=1e-15)
     assert (result.interval_s == 0.25).all()
 
@@ -93,7 +93,7 @@ def test_filters_without_a_law_use_the_interval_of_the_scenario(kind):
 def test_the_tracks_by_hand():
     def truth(**track):
         scenario = Scenario(runs=1, steps=8, interval_s=0.5, track=Track(**track))
-        return simulate(auvest.Ukf(START, P0), scenario).truth[0]
+        return simulate(auvest.Ukf(START, P0, **PAPER), scenario).truth[0]
 
     t = 0.5 * np.arange(1, 9)[:, None]
     p, v, a = np.array([0.2, 2.0]), np.array([0.1, 0.2]), np.array([0.01, 0.02])
@@ -124,9 +124,9 @@ def test_the_noise_has_the_mean_and_standard_deviation_it_says(kind, centred):
 
     # Seen in the measurements of a track far from the station.
     track = Track(kind="straight", position=(30.0, 20.0))
-    f = auvest.Ukf([30, 20, 0.1, 0.2, 0.01, 0.02], P0)
+    f = auvest.Ukf([30, 20, 0.1, 0.2, 0.01, 0.02], P0, **PAPER)
     result = simulate(f, Scenario(track=track, noise=noise, runs=500, steps=100))
-    d = result.truth - f.measurement.station
+    d = result.truth - PAPER["sensors"].station
     error = (
         np.stack(
             [
@@ -159,7 +159,10 @@ def test_a_filter_that_knows_the_noise_is_consistent():
     # Each run starts at the true state, so the NEES grows from 0 to its 2 as noise comes in
     # only if P0 is small; the NIS is white from the first step.
     f = auvest.Ukf(
-        [3.0, 4.0, 0.1, 0.2, 0, 0], np.diag([1e-6] * 2 + [1e-8] * 2 + [1e-10] * 2), process=process
+        [3.0, 4.0, 0.1, 0.2, 0, 0],
+        np.diag([1e-6] * 2 + [1e-8] * 2 + [1e-10] * 2),
+        process=process,
+        sensors=PAPER["sensors"],
     )
     result = simulate(f, Scenario(track=track, runs=200, steps=60))
     low, high = auvest.metrics.chi2_bounds(2, 200 * 60, level=0.999)
@@ -182,7 +185,7 @@ def test_a_random_start_is_a_draw_from_the_belief():
     p0[0, 1] = p0[1, 0] = 0.008
     p0[0, 2] = p0[2, 0] = -0.005
     quiet = auvest.ConstantAcceleration(position_psd=0, velocity_psd=0, acceleration_psd=0)
-    f = auvest.Ukf(START, p0, process=quiet)
+    f = auvest.Ukf(START, p0, process=quiet, sensors=PAPER["sensors"])
     result = simulate(f, scenario)
     for step in range(5):
         low, high = auvest.metrics.chi2_bounds(2, 2000, level=0.9999)

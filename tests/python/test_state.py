@@ -135,9 +135,7 @@ FOREIGN = {
         "process.velocity_psd is 1.0, expected 0.0001",
     ),
     "sensor": (
-        lambda: make(
-            auvest.Ukf, "float32", sensors=auvest.RangeBearing(station=(1.0, 2.0))
-        ).save(),
+        lambda: make(auvest.Ukf, "float32", sensors=auvest.RangeBearing(station=(1.0, 2.0))).save(),
         ValueError,
         "sensors.RangeBearing.station is",
     ),

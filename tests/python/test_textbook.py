@@ -10,7 +10,7 @@ from __future__ import annotations
 import mpmath
 import numpy as np
 import pytest
-from filter_support import measure
+from filter_support import PAPER, measure
 from mpmath import mp, mpf
 
 import auvest
@@ -167,7 +167,9 @@ def test_the_textbook_form_in_double_would_fail_at_the_alpha_of_the_paper():
             2.0,
             -3.0,
         )
-        ukf = auvest.Ukf(as_array(book.x)[:, 0], as_array(book.P), alpha=1e-6, beta=2.0, kappa=-3.0)
+        ukf = auvest.Ukf(
+            as_array(book.x)[:, 0], as_array(book.P), **PAPER, alpha=1e-6, beta=2.0, kappa=-3.0
+        )
         book.update([4.2, 3.1])
         ukf.update([4.2, 3.1])
         assert np.abs(ukf.x - as_array(book.x)[:, 0]).max() > 1e-6

@@ -25,6 +25,7 @@ from auvest._arguments import (
     as_integer,
     as_kind,
     as_number,
+    as_real,
     as_step,
     as_steps,
     require_range,
@@ -37,6 +38,7 @@ from auvest.intervals import FixedInterval, IntervalPolicy, MahalanobisInterval,
 from auvest.kernels import Kernel, KernelName, RejectionStreak, Unit, as_kernel, core_kernel
 from auvest.models import MeasurementModel, ProcessModel, from_description
 from auvest.models._base import UNSAVED
+from auvest.models.functions import FunctionProcess, require_none_raised
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -385,10 +387,12 @@ class GaussianFilter:
             If ``reference`` is wrong; the filter is unchanged.
         """
         self._require_policy("feedback()")
+        before = self._before_functions()
         code = self._filter.feedback(reference)
         if code == _core.UNCLEAR:
             code = self._filter.feedback(as_array("reference", reference, (2,), self._dtype))
         self._require_done("feedback", code)
+        self._require_functions_done(before)
         return float(self._filter.interval)
 
     def run(
@@ -444,8 +448,7 @@ class GaussianFilter:
         """
         as_flag("covariance", covariance)
         handles, which = self._as_sensor_rows(sensor)
-        width = max(handle.size for handle in handles)
-        rows = self._as_measurements(z, handles, which, width)
+        rows = self._as_measurements(z, handles, which)
         count = len(rows)
         if which is not None and len(which) != count:
             _refuse_rows("sensor", len(which), count)
@@ -465,12 +468,15 @@ class GaussianFilter:
             if dt is None
             else as_steps(dt, count, self._dtype),
             "input": self._as_inputs(input, count),
-            "place": self._as_places(place, handles, count),
-            "age_s": None if age_s is None else as_steps(age_s, count, self._dtype, "age_s"),
+            "place": self._as_places(place, handles, which, count),
+            "age_s": self._as_ages(age_s, count),
             "reference": track,
             "sensor": which,
         }
+        before = self._before_functions()
         done, status, columns = self._filter.run(record, handles, covariance)
+        if status == Status.ok:
+            self._require_functions_done(before)
         for name in ("P", "S") if not covariance else ():
             columns[name] = None
         if self._policy is None:
@@ -482,8 +488,11 @@ class GaussianFilter:
         )
         if status != Status.ok:
             error = FilterError("run", status, step=done, partial=result)
-            raised = [model.take_error() for model in (self._process, *self._sensors.values())]
-            raise error from next((cause for cause in raised if cause is not None), None)
+            try:
+                require_none_raised()
+            except Exception as cause:
+                raise error from cause
+            raise error
         return result
 
     # ---- State ----------------------------------------------------------------------------------
@@ -624,32 +633,42 @@ class GaussianFilter:
         return handles, np.array([index[name] for name in names.tolist()], np.int32)
 
     def _as_measurements(
-        self,
-        z: npt.ArrayLike,
-        handles: list[Any],
-        which: npt.NDArray[np.int32] | None,
-        width: int,
+        self, z: npt.ArrayLike, handles: list[Any], which: npt.NDArray[np.int32] | None
     ) -> Floats:
-        if width == 1 and np.ndim(z) == 1:
-            z = np.asarray(z)[:, np.newaxis]
-        if which is None:
-            return as_array("z", z, (None, width), self._dtype, missing=True)
-        raw = np.array(z, np.float64)
         sizes = np.array([handle.size for handle in handles])
-        if raw.ndim == 2 and raw.shape[1] == width and len(raw) == len(which):
-            beyond = np.arange(width) >= sizes[which][:, np.newaxis]
-            if not np.isnan(raw[beyond]).all():
-                k, m = (int(i) for i in np.argwhere(beyond & ~np.isnan(raw))[0])
-                raise ValueError(
-                    f"z[{k}, {m}] is {raw[k, m]}, but the sensor of row {k} measures "
-                    f"{sizes[which[k]]} numbers; the rest must be NaN"
-                )
-            given = ~np.isnan(raw[:, 0])
-            raw[beyond & given[:, np.newaxis]] = 0.0
-            rows = as_array("z", raw, (None, width), self._dtype, missing=True)
-            rows[beyond] = np.nan
-            return rows
-        return as_array("z", raw, (None, width), self._dtype, missing=True)
+        if sizes.max() == 1 and np.ndim(z) == 1:
+            z = np.asarray(z)[:, np.newaxis]
+        return self._as_filled("z", z, sizes, which, "measures")
+
+    def _as_filled(
+        self,
+        name: str,
+        value: npt.ArrayLike,
+        sizes: npt.NDArray[np.int_],
+        which: npt.NDArray[np.int32] | None,
+        what: str,
+    ) -> Floats:
+        """Take rows that are NaN throughout, or behind the numbers of a sensor that has fewer."""
+        width = int(sizes.max())
+        if which is None or (sizes == width).all():
+            return as_array(name, value, (None, width), self._dtype, missing=True)
+        raw = as_real(name, value, (None, width))
+        if raw.ndim != 2 or raw.shape[1] != width:
+            return as_array(name, value, (None, width), self._dtype)  # says what is wrong
+        if len(raw) != len(which):
+            _refuse_rows("sensor", len(which), len(raw), name)
+        raw = raw.astype(np.float64)
+        beyond = np.arange(width) >= sizes[which][:, np.newaxis]
+        if not np.isnan(raw[beyond]).all():
+            k, m = (int(i) for i in np.argwhere(beyond & ~np.isnan(raw))[0])
+            raise ValueError(
+                f"{name}[{k}, {m}] is {raw[k, m]}, but the sensor of row {k} {what} "
+                f"{sizes[which[k]]} numbers; the rest must be NaN"
+            )
+        raw[beyond & ~np.isnan(raw[:, :1])] = 0.0
+        rows = as_array(name, raw, (None, width), self._dtype, missing=True)
+        rows[beyond] = np.nan
+        return rows
 
     def _as_input(self, input: npt.ArrayLike | None) -> Floats | None:
         names = self._process.input
@@ -678,28 +697,53 @@ class GaussianFilter:
         return as_array("place", given, (handle.place,), self._dtype)
 
     def _as_places(
-        self, place: npt.ArrayLike | None, handles: list[Any], count: int
+        self,
+        place: npt.ArrayLike | None,
+        handles: list[Any],
+        which: npt.NDArray[np.int32] | None,
+        count: int,
     ) -> Floats | None:
         if place is None:
             return None
-        width = max(handle.place for handle in handles)
-        if width == 0:
+        sizes = np.array([handle.place for handle in handles])
+        if sizes.max() == 0:
             raise TypeError("place must be None: the place of this sensor is no part of its model")
-        if width == 1 and np.ndim(place) == 1:
+        if sizes.max() == 1 and np.ndim(place) == 1:
             place = np.asarray(place)[:, np.newaxis]
-        given = as_array("place", place, (None, width), self._dtype, missing=True)
+        given = self._as_filled("place", place, sizes, which, "stands at")
         _require_rows("place", given, count)
         places = np.full((count, _core.MAX_PLACE), np.nan, self._dtype)
-        places[:, :width] = given
+        places[:, : given.shape[1]] = given
         return places
+
+    def _as_ages(self, age_s: npt.ArrayLike | None, count: int) -> Floats | None:
+        if age_s is None:
+            return None
+        ages = as_steps(age_s, count, self._dtype, "age_s")
+        if self.late_s == 0 and ages.any():
+            k = int(np.argmax(ages > 0))
+            where = f"age_s[{k}]" if np.ndim(age_s) else "age_s"
+            raise ValueError(f"{where} is {ages[k]}, but late_s of this filter is 0")
+        return ages
+
+    def _before_functions(self) -> _Filter[Any] | None:
+        """Keep the filter as it is where a policy may ask a function of the process that fails."""
+        asks = self._policy is not None and isinstance(self._process, FunctionProcess)
+        return self._filter.copy() if asks else None
+
+    def _require_functions_done(self, before: _Filter[Any] | None) -> None:
+        if before is None:
+            return
+        try:
+            require_none_raised()
+        except BaseException:
+            self._filter = before
+            raise
 
     def _require_done(self, action: str, code: int) -> None:
         if code == 0:
             return
-        for model in (self._process, *self._sensors.values()):
-            raised = model.take_error()
-            if raised is not None:
-                raise raised
+        require_none_raised()
         raise FilterError(action, Status(code)) from None
 
 
@@ -741,5 +785,5 @@ def _require_rows(name: str, array: Floats, rows: int) -> None:
         _refuse_rows(name, len(array), rows)
 
 
-def _refuse_rows(name: str, have: int, rows: int) -> NoReturn:
-    raise ValueError(f"{name} has {have} rows and z has {rows}; they must have the same")
+def _refuse_rows(name: str, have: int, rows: int, other: str = "z") -> NoReturn:
+    raise ValueError(f"{name} has {have} rows and {other} has {rows}; they must have the same")

@@ -8,7 +8,7 @@ from auvest.models._base import MeasurementModel, Model, ProcessModel
 from auvest.models.body_velocity import BodyVelocity
 from auvest.models.constant_acceleration import ConstantAcceleration
 from auvest.models.depth import Depth
-from auvest.models.functions import FunctionProcess, FunctionSensor
+from auvest.models.functions import FunctionProcess, FunctionSensor, from_names
 from auvest.models.leader_range import LeaderRange
 from auvest.models.odometry import Odometry
 from auvest.models.position import Position
@@ -38,6 +38,8 @@ def from_description(description: dict[str, Any]) -> Model:
     """
     params = dict(description)
     name = params.pop("class", None)
+    if name == "FunctionSensor":
+        return from_names(params)
     model = {**PROCESSES, **SENSORS}.get(name)
     if model is None:
         raise ValueError(f"there is no model {name!r}")

@@ -79,11 +79,6 @@ class Model:
         for name in names:
             object.__setattr__(self, name, as_number(name, getattr(self, name), bound))
 
-    def take_error(self) -> BaseException | None:
-        """Give what a function of the model raised since the last time."""
-        raised: list[BaseException] = self.__dict__.get("_raised", [])
-        return raised.pop() if raised else None
-
 
 #: Begins what is kept instead of a description where a model cannot be described.
 UNSAVED = "!"
@@ -218,17 +213,17 @@ class MeasurementModel(Model):
         ndarray, shape (m,) or (K, m)
         """
         least = len(self.observes)
-        rows = np.atleast_2d(as_array("x", x, (None,) * np.ndim(x), _FLOAT64))
-        known = _core.sensor_states(self.core_name)
-        if np.ndim(x) not in (1, 2) or rows.shape[1] < least or np.shape(x)[-1] == 0:
+        shape = np.shape(x)
+        if len(shape) not in (1, 2) or shape[-1] < least:
             raise ValueError(
-                f"x has shape {np.shape(x)}, expected (n,) or (K, n) with n at least {least}"
+                f"x has shape {shape}, expected (n,) or (K, n) with n at least {least}"
             )
-        states = min(n for n in known if n >= least)
+        rows = np.atleast_2d(as_array("x", x, (None,) * len(shape), _FLOAT64))
+        states = min(n for n in _core.sensor_states(self.core_name) if n >= least)
         leading = np.zeros((len(rows), states))
         leading[:, : min(states, rows.shape[1])] = rows[:, :states]
         z: npt.NDArray[np.float64] = self.core(states, _FLOAT64).h(leading)
-        return z[0] if np.ndim(x) == 1 else z
+        return z[0] if len(shape) == 1 else z
 
     def check_process(self, process: ProcessModel) -> None:
         """Refuse a process whose state does not begin with what this measurement depends on.

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib
+import sys
+import threading
 from collections.abc import Callable, Sequence
 from typing import Any, TypeAlias
 
@@ -16,6 +18,26 @@ from auvest.models._base import MeasurementModel, ProcessModel, saved_as
 Array: TypeAlias = npt.NDArray[np.float64]
 
 _FLOAT64 = np.dtype(np.float64)
+
+
+class _Raised(threading.local):
+    """What functions raised in this thread: C++ carries no exception of Python through a filter."""
+
+    def __init__(self) -> None:
+        self.errors: list[BaseException] = []
+
+    def keep(self, error: BaseException) -> None:
+        self.errors.append(error)
+
+
+_RAISED = _Raised()
+
+
+def require_none_raised() -> None:
+    """Raise the first of what functions of models raised in this thread since the last time."""
+    errors, _RAISED.errors = _RAISED.errors, []
+    if errors:
+        raise errors[0]
 
 
 class FunctionProcess(ProcessModel):
@@ -66,7 +88,6 @@ class FunctionProcess(ProcessModel):
         self.noise = Q if callable(Q) else _as_noise(Q, n)
         self.jacobian = None if jacobian is None else _as_function("jacobian", jacobian)
         self.angles = _as_places("angles", angles, n)
-        self._raised: list[BaseException] = []
 
     def core(self, dtype: DType) -> Any:
         """Give the core's process model; float32 is refused."""
@@ -81,9 +102,23 @@ class FunctionProcess(ProcessModel):
                 noise,
                 self.jacobian,
                 list(self.angles),
-                self._raised,
+                _RAISED.keep,
             ),
         )
+
+    def f(self, x: npt.ArrayLike, dt: float, input: npt.ArrayLike | None = None) -> Array:
+        """As :meth:`ProcessModel.f`; raises what the function raises."""
+        return _done(super().f(x, dt, input))
+
+    def Phi(
+        self, dt: float, x: npt.ArrayLike | None = None, input: npt.ArrayLike | None = None
+    ) -> Array:
+        """As :meth:`ProcessModel.Phi`; raises what the function raises."""
+        return _done(super().Phi(dt, x, input))
+
+    def Q(self, dt: float, input: npt.ArrayLike | None = None) -> Array:
+        """As :meth:`ProcessModel.Q`; raises what the function raises."""
+        return _done(super().Q(dt, input))
 
     def description(self) -> dict[str, Any]:
         """Say what the model is, for saved states; functions are named by module and name.
@@ -139,10 +174,11 @@ class FunctionSensor(MeasurementModel):
         size = 1 if np.ndim(R) == 0 else np.shape(R)[0]
         as_integer("the size of R", size, 1, _core.MAX_FUNCTION_SIZE)
         self.R = as_covariance("R", np.reshape(R, (1, 1)) if np.ndim(R) == 0 else R, size, _FLOAT64)
+        if np.linalg.eigvalsh(self.R)[0] <= 0:
+            raise ValueError("R must be positive definite")
         self.measures = tuple(f"z_{i}" for i in range(size))
         self.jacobian = None if jacobian is None else _as_function("jacobian", jacobian)
         self.angles = _as_places("angles", angles, size)
-        self._raised: list[BaseException] = []
 
     def core(self, states: int, dtype: DType) -> Any:
         """Give the core's measurement model for so many states; float32 is refused."""
@@ -158,7 +194,7 @@ class FunctionSensor(MeasurementModel):
                 self.R,
                 self.jacobian,
                 list(self.angles),
-                self._raised,
+                _RAISED.keep,
             )
             sensor.description = saved_as(self)
             return sensor
@@ -187,6 +223,11 @@ class FunctionSensor(MeasurementModel):
             "jacobian": None if self.jacobian is None else _name("jacobian", self.jacobian),
             "angles": list(self.angles),
         }
+
+
+def _done(result: Array) -> Array:
+    require_none_raised()
+    return result
 
 
 class _PerSecond:
@@ -233,6 +274,33 @@ def _require_double(model: object, dtype: DType) -> None:
             f"{type(model).__name__} is for float64: a Python function has no float32 bits; "
             "write the model in C++ (auvest.load_models) for these"
         )
+
+
+def from_names(description: dict[str, Any]) -> FunctionSensor:
+    """Make the sensor again that described itself; only of modules that are imported already.
+
+    Raises
+    ------
+    ValueError
+        If a function is not there.
+    """
+    h, jacobian = _named(description["h"]), description["jacobian"]
+    return FunctionSensor(
+        h,
+        description["R"],
+        None if jacobian is None else _named(jacobian),
+        angles=description["angles"],
+    )
+
+
+def _named(name: str) -> Any:
+    module, _, path = name.partition(":")
+    found: Any = sys.modules.get(module)
+    for part in path.split("."):
+        found = getattr(found, part, None)
+    if found is None:
+        raise ValueError(f"state needs {name}, which is not there; import {module} first")
+    return found
 
 
 def _name(what: str, function: Any) -> str:
