@@ -254,6 +254,8 @@ def noise(model: auvest.MeasurementModel) -> np.ndarray:
     """Standard deviations of its numbers, or something of that size."""
     if isinstance(model, auvest.FunctionSensor):
         return np.sqrt(np.diag(model.R))
+    if isinstance(model, auvest.Position):
+        return np.sqrt(np.diag(model.covariance_m2))
     fields = [f.name for f in dataclasses.fields(model) if f.name.startswith("sigma_")]
     given = [np.ravel(getattr(model, name))[0] for name in fields]
     size = len(model.measures)
@@ -262,12 +264,13 @@ def noise(model: auvest.MeasurementModel) -> np.ndarray:
 
 def place_size(model: auvest.MeasurementModel) -> int:
     """How many coordinates say where the sensor stands."""
-    return 0 if model.place is None else len(getattr(model, model.place))
+    return 0 if model.place is None else int(np.size(getattr(model, model.place)))
 
 
 def moved(model: auvest.MeasurementModel, place: np.ndarray) -> auvest.MeasurementModel:
     assert model.place is not None
-    return dataclasses.replace(model, **{model.place: tuple(place.tolist())})
+    value = float(place[0]) if len(place) == 1 else tuple(place.tolist())
+    return dataclasses.replace(model, **{model.place: value})
 
 
 def row(f, width: int) -> dict[str, np.ndarray]:
