@@ -3,12 +3,13 @@
 #pragma once
 
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "auvest/slat/dead_reckoning.hpp"
 #include "auvest/slat/ekf_slat.hpp"
 #include "auvest/slat/imm_slat.hpp"
-#include "auvest/slat/sighting.hpp"
+#include "auvest/slat/echo.hpp"
 
 namespace auvest {
 
@@ -33,7 +34,7 @@ class AnySlat {
   using SlaveBelief = Belief<Scalar, Pose>;
   using MasterBelief = Belief<Scalar, 6>;
   using VelocityChange = Vector<Scalar, 2>;
-  using Echo = Sighting<Scalar>;
+  using Echo = auvest::Echo<Scalar>;
 
   struct Interface {
     virtual ~Interface() = default;
@@ -128,7 +129,8 @@ class SlatModel : public AnySlat<typename Filter::Scalar, Filter::kPose>::Interf
   typename Any::SlaveBelief slave() const override { return filter_.slave(); }
 
  protected:
-  explicit SlatModel(const Filter& filter) : filter_(filter) {}
+  template <class... Arguments>
+  explicit SlatModel(Arguments&&... arguments) : filter_(std::forward<Arguments>(arguments)...) {}
 
   Filter filter_;
 };
@@ -145,10 +147,10 @@ class SlatfModel : private std::vector<typename Filter::Scalar>, public SlatMode
   template <class Setup>
   explicit SlatfModel(const Setup& setup)
       : Storage(Filter::Set::storage_size(setup.particles)),
-        Base(Filter(setup.motion, setup.master, setup.params, Storage::data(), setup.particles,
-                    setup.resampling)) {}
+        Base(setup.motion, setup.master, setup.params, Storage::data(), setup.particles,
+             setup.resampling) {}
   SlatfModel(const SlatfModel& other)
-      : Storage(other), Base(Filter(other.filter_, Storage::data())) {}
+      : Storage(other.size()), Base(other.filter_, Storage::data()) {}
 
   std::unique_ptr<typename Any::Interface> clone() const override {
     return std::unique_ptr<typename Any::Interface>(new SlatfModel(*this));
@@ -194,6 +196,7 @@ class GaussianSlatModel : public SlatModel<Filter> {
   using typename Base::Scalar;
 
   explicit GaussianSlatModel(const Filter& filter) : Base(filter) {}
+  GaussianSlatModel(const GaussianSlatModel& other) : Base(other.filter_) {}
 
   std::unique_ptr<typename Any::Interface> clone() const override {
     return std::unique_ptr<typename Any::Interface>(new GaussianSlatModel(*this));

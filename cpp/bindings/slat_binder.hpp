@@ -31,7 +31,7 @@ class SlatBinder {
   using Any = AnySlat<Scalar, kPose>;
   using Switch = Outage<Any, Any::kMasters>;
   using Master = PiecewiseAcceleration<Scalar>;
-  using Echo = Sighting<Scalar>;
+  using Echo = auvest::Echo<Scalar>;
   using Change = typename Any::VelocityChange;
   using Device = Sonar<Scalar>;
   using Integers = Array<std::int64_t>;

@@ -11,7 +11,7 @@
 #include "auvest/math/angle.hpp"
 #include "auvest/math/random.hpp"
 #include "auvest/math/trigonometry.hpp"
-#include "auvest/slat/sighting.hpp"
+#include "auvest/slat/echo.hpp"
 #include "auvest/status.hpp"
 #include "auvest/types.hpp"
 
@@ -161,7 +161,7 @@ inline Status run_slat(Filter& filter, const Sonar<typename Filter::Scalar>& son
     if (k % scenario.odometry_per_ping != 0) continue;
 
     const double time = dt * k;
-    Sighting<Scalar> heard[SlatScenario::kMasters];
+    Echo<Scalar> heard[SlatScenario::kMasters];
     int count = 0;
     for (int n = 0; n < scenario.count; ++n) {
       double noise[2];

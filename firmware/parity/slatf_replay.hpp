@@ -90,7 +90,7 @@ class Replay {
     const float dt = read();
     typename Filter::Control u;
     typename Filter::VelocityChange change;
-    Sighting<float> echo;
+    Echo<float> echo;
     read(u);
     read(change);
     const bool heard = stream_.read() != 0;

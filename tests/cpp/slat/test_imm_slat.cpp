@@ -20,7 +20,7 @@ namespace {
 using auvest::Belief;
 using auvest::EkfSlat;
 using auvest::Matrix;
-using auvest::Sighting;
+using auvest::Echo;
 using auvest::Status;
 using auvest::Vector;
 using auvest::math::Random;
@@ -172,7 +172,7 @@ struct Textbook {
   }
 
   /// Returns the likelihood of the echo.
-  double update(int j, const Sighting<double>& seen, const auvest::Sonar<double>& sonar) {
+  double update(int j, const Echo<double>& seen, const auvest::Sonar<double>& sonar) {
     auvest::Sonar<double>::View<double, 3> view;
     const int at = 3 + 6 * seen.master;
     const Vector<double, 3> here = x[j].head<3>();
@@ -227,7 +227,7 @@ TEST_CASE("EKF-SLAT with an Imm: two masters, against the textbook over the join
     for (int j = 0; j < 4; ++j) book.predict(j, motion, u, dt);
     if (k % 3 == 0) continue;
 
-    Sighting<double> seen;
+    Echo<double> seen;
     seen.master = k / 3 % 2;
     const double t = 0.5 * (k + 1), side = seen.master == 0 ? 60 : -40;
     const auto slave = slat.slave().x;
@@ -275,7 +275,7 @@ TEST_CASE("EKF-SLAT with an Imm: headings on both sides of the cut are mixed as 
       REQUIRE(filter[turned].add_master(master) == Status::kOk);
       for (int k = 0; k < 20; ++k) {
         REQUIRE(filter[turned].predict(1, Vector<double, 2>(1, 0), random) == Status::kOk);
-        Sighting<double> seen;
+        Echo<double> seen;
         seen.master = 0;
         seen.z << 25 + 5 * world[turned].normal<double>(), 0.5 * world[turned].normal<double>();
         REQUIRE(filter[turned].update(&seen, 1, sonar_from_heading<double>(), random) ==
@@ -307,7 +307,7 @@ void check_same_bits(Filter& imm, Other& plain) {
     const Vector<Scalar, 2> u(Scalar(2), Scalar(0.05));
     REQUIRE(imm.predict(Scalar(0.5), u, random_imm, &change) == Status::kOk);
     REQUIRE(plain.predict(Scalar(0.5), u, random_plain, &change) == Status::kOk);
-    Sighting<Scalar> seen;
+    Echo<Scalar> seen;
     seen.master = 0;
     seen.z << Scalar(100 + noise.normal<double>()), Scalar(-2 + 0.06 * noise.normal<double>());
     REQUIRE(imm.update(&seen, 1, sonar, random_imm) == Status::kOk);
@@ -360,7 +360,7 @@ TEST_CASE("Imm: with a slave that is known, one particle is the joint filter") {
     const Vector<double, 2> u(2, 0.05);
     REQUIRE(joint.predict(0.5, u, random) == Status::kOk);
     REQUIRE(owner.filter.predict(0.5, u, random) == Status::kOk);
-    Sighting<double> seen;
+    Echo<double> seen;
     seen.master = 0;
     seen.z << 100 + random.normal<double>(), -2 + 0.06 * random.normal<double>();
     REQUIRE(joint.update(&seen, 1, sonar, random) == Status::kOk);
@@ -413,7 +413,7 @@ struct Manoeuvre {
       const Vector<Scalar, 2> u(Scalar(0), Scalar(0));
       REQUIRE(filter.predict(Scalar(1), u, random) == Status::kOk);
       const double dx = master.position[0] - 1, dy = master.position[1] - 2;
-      Sighting<Scalar> seen;
+      Echo<Scalar> seen;
       seen.master = 0;
       seen.z << Scalar(std::hypot(dx, dy) + 0.3 * world.normal<double>()),
           Scalar(auvest::math::wrap(std::atan2(dy, dx) - 3 + 0.003 * world.normal<double>()));
@@ -492,7 +492,7 @@ void check_survival(Filter& filter) {
     // Silence of 200 s, then echoes of which each third is wrong by anything.
     const float dt = k == 150 ? 200 : k % 7 == 0 ? 0.0f : 0.5f;
     REQUIRE(filter.predict(dt, Vector<float, 2>(2, 0.05f), random) == Status::kOk);
-    Sighting<float> seen;
+    Echo<float> seen;
     seen.master = 0;
     seen.z << 100 + world.normal<float>(), -2 + 0.06f * world.normal<float>();
     if (k % 3 == 2) seen.z(0) = far[k / 3 % 5];
@@ -602,7 +602,7 @@ TEST_CASE("EKF-SLAT with an Imm: what is refused leaves it as it was") {
   Random random(41);
   Filter filter(Unicycle<double>(), three_models<double>(0.1));
   const auto sonar = sonar_from_heading<double>();
-  Sighting<double> seen;
+  Echo<double> seen;
   seen.master = 0;
   seen.z << 100, -2;
   const Vector<double, 2> u(2, 0.05);

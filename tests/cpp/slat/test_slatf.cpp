@@ -56,7 +56,7 @@ void check_equals_ekf() {
     REQUIRE(ekf.predict(Scalar(1)) == Status::kOk);
     if (k % 2 == 0) continue;
     const auto slave = slatf.slave().x;
-    Sighting<Scalar> seen;
+    Echo<Scalar> seen;
     seen.master = 0;
     seen.z(0) = Scalar(300 - 0.5 * k + random.normal<double>());
     seen.z(1) = Scalar(1.5 - 0.004 * k + 0.06 * random.normal<double>());
@@ -153,7 +153,7 @@ void check_independence() {
     REQUIRE(filter.predict(Scalar(1), Vector<Scalar, 2>(Scalar(5), Scalar(0.1)), random) ==
             Status::kOk);
     const std::vector<Scalar> before = owner.storage;
-    Sighting<Scalar> seen;
+    Echo<Scalar> seen;
     seen.master = trial % masters;
     seen.z << Scalar(200 + random.normal<double>()), Scalar(-2 + 0.1 * random.normal<double>());
     REQUIRE(filter.update(&seen, 1, auvest::Sonar<Scalar>(), random) == Status::kOk);
@@ -192,7 +192,7 @@ TEST_CASE("SLATF 2.0: two masters at once weigh what the joint Gaussian gives, i
   Eigen::Matrix<double, 4, 1> innovation;
   Eigen::Matrix<double, 4, 4> s = Eigen::Matrix<double, 4, 4>::Zero();
   Eigen::Matrix<double, 4, 2> by_slave;
-  Sighting<double> seen[2];
+  Echo<double> seen[2];
   const Belief<double, 6>* masters[2] = {&first, &second};
   for (int n = 0; n < 2; ++n) {
     Belief<double, 6> ahead = *masters[n];
@@ -220,7 +220,7 @@ TEST_CASE("SLATF 2.0: two masters at once weigh what the joint Gaussian gives, i
     REQUIRE(owner.filter.add_master(first) == Status::kOk);
     REQUIRE(owner.filter.add_master(second) == Status::kOk);
     REQUIRE(owner.filter.predict(problem.dt, problem.reading, random) == Status::kOk);
-    Sighting<double> order[2] = {seen[swapped ? 1 : 0], seen[swapped ? 0 : 1]};
+    Echo<double> order[2] = {seen[swapped ? 1 : 0], seen[swapped ? 0 : 1]};
     REQUIRE(owner.filter.update(order, 2, problem.sonar, random) == Status::kOk);
     CHECK(std::fabs(owner.filter.log_likelihood() - expected) < 0.005);
   }
@@ -238,7 +238,7 @@ TEST_CASE_TEMPLATE("SLATF: refused calls leave all bits", Filter,
   Filter& filter = owner.filter;
   Random random(81);
   const auvest::Sonar<float> sonar;
-  Sighting<float> seen[2];
+  Echo<float> seen[2];
   seen[0].master = 0;
   seen[1].master = 1;
   seen[0].z << 200, -2;
@@ -287,7 +287,7 @@ TEST_CASE_TEMPLATE("SLATF: refused calls leave all bits", Filter,
   wrong = seen[0];
   wrong.master = 2;
   CHECK(filter.update(&wrong, 1, sonar, random) == Status::kBadParameter);
-  const Sighting<float> twice[2] = {seen[0], seen[0]};
+  const Echo<float> twice[2] = {seen[0], seen[0]};
   CHECK(filter.update(twice, 2, sonar, random) == Status::kBadParameter);
   CHECK(owner.storage == before);
 }
@@ -376,7 +376,7 @@ TEST_CASE("SLATF: the same seed gives the same bits, the mean of the heading cro
     REQUIRE(owner->filter.reset(start, 100, random) == Status::kOk);
     REQUIRE(owner->filter.add_master(master_belief<float>(100, 200, 0, 0, 1)) == Status::kOk);
     REQUIRE(owner->filter.predict(1, Vector<float, 2>(1, 0.1f), random) == Status::kOk);
-    Sighting<float> seen;
+    Echo<float> seen;
     seen.master = 0;
     seen.z << 224, 1.1f - 3.2f;
     auvest::Sonar<float>::Params sonar;
@@ -395,7 +395,7 @@ TEST_CASE("SLATF: the same seed gives the same bits, the mean of the heading cro
 /// Echoes of the masters as the filter believes them, with noise; in any order, known or not.
 template <class Filter>
 void hear(const Filter& filter, const auvest::Sonar<float>& sonar, bool known, Random& noise,
-          Sighting<float>* seen) {
+          Echo<float>* seen) {
   for (int n = 0; n < filter.masters(); ++n) {
     const auto slave = filter.slave().x;
     const auto master = filter.master(n).x;
@@ -403,7 +403,7 @@ void hear(const Filter& filter, const auvest::Sonar<float>& sonar, bool known, R
     const float dy = slave(1) - master(1);
     float a, b;
     noise.normal_pair(a, b);
-    Sighting<float>& echo = seen[filter.masters() - 1 - n];
+    Echo<float>& echo = seen[filter.masters() - 1 - n];
     echo.master = known ? n : auvest::kUnknownMaster;
     echo.z(0) = std::sqrt(dx * dx + dy * dy) + sonar.params.sigma_range_m * a;
     echo.z(1) = auvest::math::atan2(dy, dx) + sonar.params.sigma_bearing_rad * b;
@@ -430,12 +430,12 @@ void run_pair(bool stepwise, bool known, Owner<Filter>& a, Owner<Filter>& b) {
   }
   for (int k = 0; k < 30; ++k) {
     const Vector<float, 2> u(2, 0.1f * static_cast<float>(k));
-    Sighting<float> seen[3];
+    Echo<float> seen[3];
     REQUIRE(a.filter.predict(1, u, random_a) == Status::kOk);
     hear(a.filter, sonar, true, noise, seen);
     const int count = k % 4;
     REQUIRE(a.filter.update(seen, count, sonar, random_a) == Status::kOk);
-    for (Sighting<float>& echo : seen) {
+    for (Echo<float>& echo : seen) {
       if (!known) echo.master = auvest::kUnknownMaster;
     }
     if (stepwise) {
@@ -464,7 +464,7 @@ TEST_CASE_TEMPLATE("SLATF: step() has the bits of predict() and update()", Filte
   CHECK(a.storage == b.storage);
   CHECK(a.filter.log_likelihood() == b.filter.log_likelihood());
   Random random(1);
-  Sighting<float> seen[1];
+  Echo<float> seen[1];
   seen[0].master = 0;
   seen[0].z << std::nanf(""), 0;
   const Vector<float, 2> u(2, 0);
@@ -589,7 +589,7 @@ TEST_CASE_TEMPLATE("SLATF: a master is born from an echo that nobody expects, on
     const double y = 60 - 0.5 * k;
     double a, b;
     noise.normal_pair(a, b);
-    Sighting<double> seen;
+    Echo<double> seen;
     seen.master = auvest::kUnknownMaster;
     seen.z << std::hypot(x, y) + a, auvest::math::wrap(std::atan2(-y, -x) + 0.06 * b);
     REQUIRE(filter.update(&seen, 1, sonar, random) == Status::kOk);

@@ -5,13 +5,13 @@
 //     outage.predict(...), update(...)  no word came: the filter starts from the last shared state
 //     outage.slave()                    the shared state, or the filter's
 //
-// Filter: Slatf, EkfSlat or DeadReckoning.
+// Filter: one of slat_filter.hpp.
 #pragma once
 
 #include <cstdint>
 
 #include "auvest/math/random.hpp"
-#include "auvest/slat/sighting.hpp"
+#include "auvest/slat/echo.hpp"
 #include "auvest/status.hpp"
 #include "auvest/types.hpp"
 
@@ -33,7 +33,14 @@ class Outage {
   using MasterBelief = typename Filter::MasterBelief;
   using VelocityChange = typename Filter::VelocityChange;
 
+  /// Goes on with a copy of `filter`.
   explicit Outage(const Filter& filter) : filter_(filter), mode_(Communication::kNever) {}
+
+  /// The same for a filter with particles: those of the copy live in `storage`, which is as large
+  /// as that of `filter` and must outlive the outage. It may be the same, where `filter` is not
+  /// used any more.
+  Outage(const Filter& filter, Scalar* storage)
+      : filter_(filter, storage), mode_(Communication::kNever) {}
 
   /// Takes over what communication brings, and ends an outage. `masters` holds `count` beliefs.
   Status share(const SlaveBelief& slave, const MasterBelief* masters, int count) {
@@ -68,11 +75,10 @@ class Outage {
   }
 
   /// An echo counts only while the filter runs.
-  Status update(const Sighting<Scalar>* sightings, int count, const Sonar<Scalar>& sonar,
+  Status update(const Echo<Scalar>* echoes, int count, const Sonar<Scalar>& sonar,
                 math::Random& random) {
     if (mode_ == Communication::kNever) return Status::kNotInitialised;
-    return mode_ == Communication::kUp ? Status::kOk
-                                       : filter_.update(sightings, count, sonar, random);
+    return mode_ == Communication::kUp ? Status::kOk : filter_.update(echoes, count, sonar, random);
   }
 
   SlaveBelief slave() const { return mode_ == Communication::kDown ? filter_.slave() : slave_; }

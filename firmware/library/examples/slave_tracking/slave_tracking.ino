@@ -88,7 +88,7 @@ AUVEST_OUTLINE void predict(float from_s, float to_s) {
 }
 
 AUVEST_OUTLINE void update() {
-  const auvest::Sighting<float> echo = {sample.z, 0};
+  const auvest::Echo<float> echo = {sample.z, 0};
   note(filter.update(&echo, 1, sonar, random_numbers));
 }
 

@@ -11,30 +11,30 @@ namespace auvest {
 /// The master of an echo of which nobody knows whose it is.
 constexpr int kUnknownMaster = -1;
 
-/// One echo: range [m] and bearing [rad], and the master that it belongs to.
+/// One measurement of the sonar: range [m] and bearing [rad], and the master that it belongs to.
 template <class Scalar>
-struct Sighting {
+struct Echo {
   Vector<Scalar, 2> z;
   int master;
 };
 
-/// kOk if `count` sightings of `masters` masters can be taken in: finite, each master at most once,
-/// no more echoes than masters, and none that is unknown if `known_only`.
+/// kOk if an update by `count` echoes of `masters` masters is possible: finite, each master at most
+/// once, no more echoes than masters.
 template <class Scalar>
-inline Status check_sightings(const Sighting<Scalar>* sightings, int count, int masters,
-                              const Sonar<Scalar>& sonar, int pose_states, bool known_only) {
+inline Status check_echoes(const Echo<Scalar>* echoes, int count, int masters,
+                           const Sonar<Scalar>& sonar, int pose_states) {
   if (count < 0 || count > masters || sonar.check(pose_states) != Status::kOk)
     return Status::kBadParameter;
   for (int s = 0; s < count; ++s) {
-    if (!math::all_finite(sightings[s].z)) return Status::kNotFinite;
-    const int master = sightings[s].master;
-    const bool unknown = master == kUnknownMaster && !known_only;
+    if (!math::all_finite(echoes[s].z)) return Status::kNotFinite;
+    const int master = echoes[s].master;
+    const bool unknown = master == kUnknownMaster;
     if (!unknown && (master < 0 || master >= masters)) return Status::kBadParameter;
     for (int earlier = 0; earlier < s; ++earlier) {
-      if (!unknown && sightings[earlier].master == master) return Status::kBadParameter;
+      if (!unknown && echoes[earlier].master == master) return Status::kBadParameter;
     }
     for (int k = 0; k < 2; ++k) {
-      const Scalar z = sightings[s].z(k);
+      const Scalar z = echoes[s].z(k);
       if (z > Scalar(1e9) || z < Scalar(-1e9)) return Status::kOverflow;
     }
   }
