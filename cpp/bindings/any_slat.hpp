@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "auvest/slat/dead_reckoning.hpp"
+#include "auvest/slat/echo.hpp"
 #include "auvest/slat/ekf_slat.hpp"
 #include "auvest/slat/imm_slat.hpp"
-#include "auvest/slat/echo.hpp"
 
 namespace auvest {
 

@@ -1,5 +1,5 @@
-// Models written in Python. What a function raises goes to `keep`, and NaN to the core, which refuses
-// the step; the Python layer then raises what the function raised.
+// Models written in Python. What a function raises goes to `keep`, and NaN to the core, which
+// refuses the step; the Python layer then raises what the function raised.
 #include <pybind11/stl.h>
 
 #include "desk/function_models.hpp"
@@ -56,11 +56,12 @@ py::array_t<double> vector(const double* values, py::ssize_t size) {
 
 std::shared_ptr<Process> make_process(int states, int inputs, const py::object& f,
                                       const py::object& q, const py::object& jacobian,
-                                      const std::vector<int>& angles, const py::object& keep_raised) {
+                                      const std::vector<int>& angles,
+                                      const py::object& keep_raised) {
   const py::ssize_t n = states;
   const auto keep = shared(keep_raised);
   const auto driven = [n, inputs, keep](const std::shared_ptr<py::object>& function,
-                                          std::vector<py::ssize_t> shape, const char* name) {
+                                        std::vector<py::ssize_t> shape, const char* name) {
     return [=](const double* x, double dt, const double* input, double* out) {
       const py::gil_scoped_acquire acquire;
       call(*keep, out, shape, name, [&]() -> py::object {
@@ -89,11 +90,10 @@ std::shared_ptr<Sensor> make_sensor(int states, int size, const py::object& h,
   const py::ssize_t n = states;
   const auto keep = shared(keep_raised);
   const auto at = [n, keep](const std::shared_ptr<py::object>& function,
-                              std::vector<py::ssize_t> shape, const char* name) {
+                            std::vector<py::ssize_t> shape, const char* name) {
     return [=](const double* x, double* out) {
       const py::gil_scoped_acquire acquire;
-      call(*keep, out, shape, name,
-           [&]() -> py::object { return (*function)(vector(x, n)); });
+      call(*keep, out, shape, name, [&]() -> py::object { return (*function)(vector(x, n)); });
     };
   };
   desk::SensorFunctions functions;

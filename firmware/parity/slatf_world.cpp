@@ -33,8 +33,8 @@ class Recorder {
     return auvest::Status::kOk;
   }
 
-  auvest::Status update(const auvest::Echo<float>* heard, int count,
-                        const auvest::Sonar<float>&, auvest::math::Random&) {
+  auvest::Status update(const auvest::Echo<float>* heard, int count, const auvest::Sonar<float>&,
+                        auvest::math::Random&) {
     finish(count > 0 ? heard : nullptr);
     return auvest::Status::kOk;
   }

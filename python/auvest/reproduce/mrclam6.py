@@ -54,16 +54,16 @@ YAW_RATE_DENSITY = 0.033
 DRIFT_S = 10.0
 
 MOTION = UnicycleMotion(
-    sigma_speed_mps=SPEED_DENSITY / STEP_S**0.5,
-    sigma_yaw_rate_radps=YAW_RATE_DENSITY / STEP_S**0.5,
+    sigma_speed_m_s=SPEED_DENSITY / STEP_S**0.5,
+    sigma_yaw_rate_rad_s=YAW_RATE_DENSITY / STEP_S**0.5,
 )
 SONAR = Sonar(sigma_range_m=0.12, sigma_bearing_rad=0.02, bearing="from_heading")
 GATE = 16.0
-STRAIGHT = ConstantVelocity(velocity_psd=1e-3, sigma_acceleration_mps2=0.03)
+STRAIGHT = ConstantVelocity(velocity_psd=1e-3, sigma_acceleration_m_s2=0.03)
 MASTER = Imm(
     straight=STRAIGHT,
     accelerated=ConstantAcceleration(position_psd=0, velocity_psd=0, acceleration_psd=1e-4),
-    turning=CoordinatedTurn(position_psd=0, velocity_psd=0, acceleration_psd=1e-5, slow_mps=0.02),
+    turning=CoordinatedTurn(position_psd=0, velocity_psd=0, acceleration_psd=1e-5, slow_m_s=0.02),
     share=(0.6, 0.2, 0.2),
     switch_rate_hz=0.1,
 )

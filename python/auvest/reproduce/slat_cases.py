@@ -90,15 +90,15 @@ PRECISE_SPEED_MPS, PRECISE_HEADING_RAD = 0.2, 0.03
 
 def crossing_scenario(level: int, *, runs: int, seed: int) -> SlatScenario:
     """Make the scenario of two masters that cross, heard by the sonar of ``CROSSING_LEVELS``."""
-    course, speed = PAPER_MASTER.heading_rad, PAPER_MASTER.speed_mps
+    course, speed = PAPER_MASTER.heading_rad, PAPER_MASTER.speed_m_s
     inwards = math.asin(GAP_M / 2 / (speed * MEET_S))
     masters = tuple(
         Vehicle(
             x_m=AHEAD_M[0] - side * GAP_M / 2 * math.sin(course),
             y_m=AHEAD_M[1] + side * GAP_M / 2 * math.cos(course),
             heading_rad=course - side * inwards,
-            speed_mps=speed,
-            turn_rate_radps=0.0,
+            speed_m_s=speed,
+            turn_rate_rad_s=0.0,
         )
         for side in (1, -1)
     )
@@ -111,7 +111,7 @@ def turning_scenario(*, precise: bool, runs: int, seed: int) -> SlatScenario:
     paper = replace(paper_scenario(TURNING_LEVEL, runs=runs, seed=seed), plan_known=False)
     if not precise:
         return paper
-    return replace(paper, sigma_speed_mps=PRECISE_SPEED_MPS, sigma_heading_rad=PRECISE_HEADING_RAD)
+    return replace(paper, sigma_speed_m_s=PRECISE_SPEED_MPS, sigma_heading_rad=PRECISE_HEADING_RAD)
 
 
 def imm(
@@ -122,12 +122,12 @@ def imm(
 ) -> Imm:
     """Make the master's three models."""
     return Imm(
-        straight=ConstantVelocity(velocity_psd=velocity_psd, sigma_acceleration_mps2=0.1),
+        straight=ConstantVelocity(velocity_psd=velocity_psd, sigma_acceleration_m_s2=0.1),
         accelerated=ConstantAcceleration(
             position_psd=0.0, velocity_psd=0.0, acceleration_psd=acceleration_psd
         ),
         turning=CoordinatedTurn(
-            position_psd=0.0, velocity_psd=0.0, acceleration_psd=acceleration_psd, slow_mps=0.1
+            position_psd=0.0, velocity_psd=0.0, acceleration_psd=acceleration_psd, slow_m_s=0.1
         ),
         share=share,
         switch_rate_hz=switch_rate_hz,
@@ -277,7 +277,7 @@ def _turning(
 ) -> dict[str, Any]:
     models: dict[str, list[tuple[str, Master]]] = {
         "constant acceleration": [
-            (f"{q:g} m/s^2", PiecewiseAcceleration(acceleration_mps2=q)) for q in ACCELERATIONS_M_S2
+            (f"{q:g} m/s^2", PiecewiseAcceleration(acceleration_m_s2=q)) for q in ACCELERATIONS_M_S2
         ],
         "constant velocity": [
             (f"{psd:g} m^2/s^3", imm(velocity_psd=psd, share=(1.0, 0.0, 0.0)))
@@ -313,7 +313,7 @@ def _turning(
                 }
             )
     return {
-        "sigma_speed_mps": scenario.sigma_speed_mps,
+        "sigma_speed_m_s": scenario.sigma_speed_m_s,
         "sigma_heading_rad": scenario.sigma_heading_rad,
         "models": rows,
         "imm_less": {
@@ -424,7 +424,7 @@ def _crossing_page(results: Mapping[str, Any]) -> str:
     text = f"""## Two masters that cross
 
 The masters start {GAP_M:g} m apart, abeam of each other, the middle of the two at ({AHEAD_M[0]:g},
-{AHEAD_M[1]:g}) m, on courses that meet after {MEET_S:g} s, at {PAPER_MASTER.speed_mps:g} m/s; the
+{AHEAD_M[1]:g}) m, on courses that meet after {MEET_S:g} s, at {PAPER_MASTER.speed_m_s:g} m/s; the
 slave starts at (0, 0) m. It hears both every 2 s for {2 * MEET_S:g} s, and the echoes do not say
 whose they are. EKF-SLAT gives the echoes of a ping to the masters in the way that is likeliest at
 that moment, and cannot take it back. SLATF does so in each of {results["particles"]} particles,
@@ -487,7 +487,7 @@ def _turning_page(results: Mapping[str, Any]) -> str:
     text = f"""## A master that turns
 
 One master, {PAPER_MASTER.y_m:g} m to the side, goes straight for {PAPER_MASTER.turn_start_s:g} s
-and then turns at {math.degrees(PAPER_MASTER.turn_rate_radps):.1f} degrees per second (the paper's
+and then turns at {math.degrees(PAPER_MASTER.turn_rate_rad_s):.1f} degrees per second (the paper's
 track), heard to
 {TURNING_LEVEL.sigma_range_m:g} m and {TURNING_LEVEL.sigma_bearing_rad:g} rad; the filter does not
 know the plan. EKF-SLAT with each model of the master: the paper's constant acceleration and
@@ -502,7 +502,7 @@ what keeps the two together.
     parts = [markdown.fill(text)]
     for case in results["turning"]:
         parts.append(
-            f"Odometry: {case['sigma_speed_mps']:g} m/s, {case['sigma_heading_rad']:g} rad.\n\n"
+            f"Odometry: {case['sigma_speed_m_s']:g} m/s, {case['sigma_heading_rad']:g} rad.\n\n"
             + markdown.table(
                 ["model", "noise", "relative / m", "slave / m", "covered"],
                 [
@@ -623,7 +623,7 @@ def _turning_figure(cases: Cases) -> Figure:
         axes.axvline(PAPER_MASTER.turn_start_s, color=plots.BLACK, linewidth=0.6)
         axes.set(xlabel="time / s", ylabel="rms error over the runs / m")
         axes.set_title(
-            f"odometry {case['sigma_speed_mps']:g} m/s, {case['sigma_heading_rad']:g} rad",
+            f"odometry {case['sigma_speed_m_s']:g} m/s, {case['sigma_heading_rad']:g} rad",
             fontsize=9.5,
             loc="left",
         )

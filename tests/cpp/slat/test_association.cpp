@@ -9,8 +9,8 @@
 namespace {
 
 using namespace slat_test;
-using auvest::kUnknownMaster;
 using auvest::Echo;
+using auvest::kUnknownMaster;
 using auvest::Status;
 
 /// A filter with a master near (100, 150) and one far from it, after it heard `count` echoes.

@@ -29,7 +29,7 @@ void check_equals_ekf() {
   using Scalar = typename Filter::Scalar;
   using Process = typename Filter::Master;
   typename Filter::Motion::Params still;
-  still.sigma_speed_mps = still.sigma_heading_rad = Scalar(0);
+  still.sigma_speed_m_s = still.sigma_heading_rad = Scalar(0);
   Owner<Filter> owner((typename Filter::Motion(still)), Process(), 1);
   Filter& slatf = owner.filter;
   Random random(51);
@@ -309,14 +309,14 @@ TEST_CASE("SLATF: parameters out of their range are refused, those at its ends a
   for (const float bad : {-0.1f, std::nanf(""), INFINITY}) {
     CHECK(status(&Params::resample_below, bad) == Status::kBadParameter);
     CHECK(status(&Params::gate, bad) == Status::kBadParameter);
-    CHECK(status(&Params::birth_velocity_mps, bad) == Status::kBadParameter);
-    CHECK(status(&Params::birth_acceleration_mps2, bad) == Status::kBadParameter);
+    CHECK(status(&Params::birth_velocity_m_s, bad) == Status::kBadParameter);
+    CHECK(status(&Params::birth_acceleration_m_s2, bad) == Status::kBadParameter);
   }
   for (const float end : {0.0f, 1.0f}) CHECK(status(&Params::resample_below, end) == Status::kOk);
   CHECK(status(&Params::resample_below, 1.001f) == Status::kBadParameter);
   CHECK(status(&Params::gate, 0) == Status::kOk);
-  CHECK(status(&Params::birth_velocity_mps, 0) == Status::kOk);
-  CHECK(status(&Params::birth_acceleration_mps2, 0) == Status::kBadParameter);
+  CHECK(status(&Params::birth_velocity_m_s, 0) == Status::kOk);
+  CHECK(status(&Params::birth_acceleration_m_s2, 0) == Status::kBadParameter);
 }
 
 TEST_CASE("SLATF: planned velocity changes move the master as Eq. (4) says") {
@@ -536,7 +536,7 @@ TEST_CASE("SLATF: a master is born where the echo comes from, as far as the slav
   using Second = auvest::Slatf2<auvest::UnicycleMotion<double>, Master<double>, 1>;
   auvest::SlatfParams<double> params;
   params.gate = 16;
-  params.birth_velocity_mps = 2;
+  params.birth_velocity_m_s = 2;
   auvest::Sonar<double>::Params device;
   device.bearing = auvest::Bearing::kFromHeading;
   device.sigma_range_m = 0.5;
@@ -572,7 +572,7 @@ TEST_CASE_TEMPLATE("SLATF: a master is born from an echo that nobody expects, on
                    auvest::Slatf2<Compass<double>, Master<double>, 2>) {
   typename Filter::Params params;
   params.gate = 16;
-  params.birth_velocity_mps = 2;
+  params.birth_velocity_m_s = 2;
   Owner<Filter> owner((Compass<double>()), Master<double>(), 200, params);
   Filter& filter = owner.filter;
   Random random(88);

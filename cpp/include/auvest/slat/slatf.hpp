@@ -86,8 +86,8 @@ class Slatf : public SlatfFrame<SlatfParticle<Motion_, Master_, Proposal_, Maste
   Status reset(const SlaveBelief& pose, int particles, math::Random& random) {
     const bool valid = this->fits(particles) && Frame::is_share(params_.resample_below) &&
                        math::is_nonnegative(params_.gate) &&
-                       math::is_nonnegative(params_.birth_velocity_mps) &&
-                       math::is_positive(params_.birth_acceleration_mps2) &&
+                       math::is_nonnegative(params_.birth_velocity_m_s) &&
+                       math::is_positive(params_.birth_acceleration_m_s2) &&
                        (params_.gate > Scalar(0) || !births());
     if (!valid || motion_.check() != Status::kOk || master_.check() != Status::kOk) {
       return Status::kBadParameter;
@@ -311,7 +311,7 @@ class Slatf : public SlatfFrame<SlatfParticle<Motion_, Master_, Proposal_, Maste
 
   // Births of masters are ours, not the paper's.
 
-  bool births() const { return params_.birth_velocity_mps > Scalar(0) && masters_ < Masters; }
+  bool births() const { return params_.birth_velocity_m_s > Scalar(0) && masters_ < Masters; }
 
   /// True if most of the weight finds echo s beyond the gate of every master.
   bool is_unassociated(const Update& update, int s) {
@@ -333,8 +333,8 @@ class Slatf : public SlatfFrame<SlatfParticle<Motion_, Master_, Proposal_, Maste
 
   /// A new master where each particle hears echo s come from.
   void add_master(const Update& update, int s) {
-    const Scalar velocity = params_.birth_velocity_mps * params_.birth_velocity_mps;
-    const Scalar acceleration = params_.birth_acceleration_mps2 * params_.birth_acceleration_mps2;
+    const Scalar velocity = params_.birth_velocity_m_s * params_.birth_velocity_m_s;
+    const Scalar acceleration = params_.birth_acceleration_m_s2 * params_.birth_acceleration_m_s2;
     Schedule::for_each_group(set_, [&](int i) {
       const Single particle = {set_, i};
       typename Single::Pose pose;

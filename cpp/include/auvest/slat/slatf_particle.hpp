@@ -30,8 +30,8 @@ struct SlatfParams {
   /// Standard deviations of the velocity [m/s] and the acceleration [m/s^2] of a master that is
   /// born from an echo of kUnknownMaster: where particles with more than half of the weight find
   /// the echo beyond the gate of every master. 0: no births. Needs a gate.
-  Scalar birth_velocity_mps = Scalar(0);
-  Scalar birth_acceleration_mps2 = Scalar(0.01);
+  Scalar birth_velocity_m_s = Scalar(0);
+  Scalar birth_acceleration_m_s2 = Scalar(0.01);
 };
 
 template <class Motion_, class Master_, class Proposal_, int Masters, class Lanes_>
