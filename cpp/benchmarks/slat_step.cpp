@@ -65,8 +65,8 @@ std::vector<float> read_numbers(const char* path) {
 
 Motion make_motion() {
   Motion::Params p;
-  p.sigma_speed_mps = 0.1f;
-  p.sigma_yaw_rate_radps = 0.005f;
+  p.sigma_speed_m_s = 0.1f;
+  p.sigma_yaw_rate_rad_s = 0.005f;
   return Motion(p);
 }
 

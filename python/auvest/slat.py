@@ -604,7 +604,7 @@ class Slatf(ParticleSlatFilter):
     gate : float
         An echo whose NIS (2 degrees of freedom) exceeds this in a particle says nothing to it;
         0: no gate, as in the paper. 16 loses one good echo in 3,000.
-    birth_velocity_mps, birth_acceleration_mps2 : float
+    birth_velocity_m_s, birth_acceleration_m_s2 : float
         Standard deviations of a master that is born from an unknown echo, see the algorithm's
         page; velocity 0: no births. Needs a gate.
     lanes : {"scalar", "sse2", "avx2", "avx512"}, optional
@@ -634,8 +634,8 @@ class Slatf(ParticleSlatFilter):
         resample_below: float = _SLATF["resample_below"],
         carry_covariance: bool = _SLATF["carry_covariance"],
         gate: float = _SLATF["gate"],
-        birth_velocity_mps: float = _SLATF["birth_velocity_mps"],
-        birth_acceleration_mps2: float = _SLATF["birth_acceleration_mps2"],
+        birth_velocity_m_s: float = _SLATF["birth_velocity_m_s"],
+        birth_acceleration_m_s2: float = _SLATF["birth_acceleration_m_s2"],
         lanes: Lanes | None = None,
         dtype: npt.DTypeLike = "float64",
         seed: int = 1,
@@ -648,17 +648,17 @@ class Slatf(ParticleSlatFilter):
             "resample_below": as_number("resample_below", resample_below, "not negative"),
             "carry_covariance": as_flag("carry_covariance", carry_covariance),
             "gate": as_number("gate", gate, "not negative"),
-            "birth_velocity_mps": as_number(
-                "birth_velocity_mps", birth_velocity_mps, "not negative"
+            "birth_velocity_m_s": as_number(
+                "birth_velocity_m_s", birth_velocity_m_s, "not negative"
             ),
-            "birth_acceleration_mps2": as_number(
-                "birth_acceleration_mps2", birth_acceleration_mps2, "positive"
+            "birth_acceleration_m_s2": as_number(
+                "birth_acceleration_m_s2", birth_acceleration_m_s2, "positive"
             ),
         }
         if self._params["resample_below"] > 1:
             raise ValueError(f"resample_below must lie in 0..1, not {resample_below}")
-        if self._params["birth_velocity_mps"] > 0 and self._params["gate"] == 0:
-            raise ValueError("birth_velocity_mps needs a gate above 0: births are decided by it")
+        if self._params["birth_velocity_m_s"] > 0 and self._params["gate"] == 0:
+            raise ValueError("birth_velocity_m_s needs a gate above 0: births are decided by it")
         if isinstance(self._master, Imm):
             as_kind("lanes", lanes or "scalar", ("scalar",))  # with an Imm particles run one by one
             lanes = "scalar"
@@ -679,7 +679,7 @@ class Slatf(ParticleSlatFilter):
         )
 
     def _as_numbers(self, master: npt.ArrayLike | None, count: int) -> npt.NDArray[np.int64]:
-        if master is None and self._params["birth_velocity_mps"] > 0:
+        if master is None and self._params["birth_velocity_m_s"] > 0:
             return np.full(count, UNKNOWN_MASTER, np.int64)
         return super()._as_numbers(master, count)
 

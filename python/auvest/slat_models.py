@@ -40,7 +40,7 @@ class CompassMotion:
 
     Parameters
     ----------
-    sigma_speed_mps, sigma_heading_rad : float
+    sigma_speed_m_s, sigma_heading_rad : float
         Standard deviations of one reading, not negative; the heading's at most 3.
     compensate_bias : bool
         A noisy heading shortens every displacement by ``exp(-sigma^2 / 2)`` on average: 4.4 % at
@@ -52,7 +52,7 @@ class CompassMotion:
         If an argument lies outside its range.
     """
 
-    sigma_speed_mps: float = _COMPASS["sigma_speed_mps"]
+    sigma_speed_m_s: float = _COMPASS["sigma_speed_m_s"]
     sigma_heading_rad: float = _COMPASS["sigma_heading_rad"]
     compensate_bias: bool = _COMPASS["compensate_bias"]
 
@@ -60,7 +60,7 @@ class CompassMotion:
     pose_states: ClassVar[int] = 2
 
     def __post_init__(self) -> None:
-        _check_numbers(self, "sigma_speed_mps", "sigma_heading_rad")
+        _check_numbers(self, "sigma_speed_m_s", "sigma_heading_rad")
         if self.sigma_heading_rad > 3:
             raise ValueError(f"sigma_heading_rad must be at most 3, not {self.sigma_heading_rad}")
         as_flag("compensate_bias", self.compensate_bias)
@@ -74,7 +74,7 @@ class UnicycleMotion:
 
     Parameters
     ----------
-    sigma_speed_mps, sigma_yaw_rate_radps : float
+    sigma_speed_m_s, sigma_yaw_rate_rad_s : float
         Standard deviations of one reading, not negative.
 
     Raises
@@ -83,14 +83,14 @@ class UnicycleMotion:
         If an argument lies outside its range.
     """
 
-    sigma_speed_mps: float = _UNICYCLE["sigma_speed_mps"]
-    sigma_yaw_rate_radps: float = _UNICYCLE["sigma_yaw_rate_radps"]
+    sigma_speed_m_s: float = _UNICYCLE["sigma_speed_m_s"]
+    sigma_yaw_rate_rad_s: float = _UNICYCLE["sigma_yaw_rate_rad_s"]
 
     name: ClassVar[str] = "unicycle"
     pose_states: ClassVar[int] = 3
 
     def __post_init__(self) -> None:
-        _check_numbers(self, "sigma_speed_mps", "sigma_yaw_rate_radps")
+        _check_numbers(self, "sigma_speed_m_s", "sigma_yaw_rate_rad_s")
 
 
 Motion: TypeAlias = CompassMotion | UnicycleMotion
@@ -102,7 +102,7 @@ class PiecewiseAcceleration:
 
     Parameters
     ----------
-    acceleration_mps2 : float
+    acceleration_m_s2 : float
         q, standard deviation of the jump of each prediction, m/s^2, not negative.
 
     Raises
@@ -111,10 +111,10 @@ class PiecewiseAcceleration:
         If the argument lies outside its range.
     """
 
-    acceleration_mps2: float = _MASTER["acceleration_mps2"]
+    acceleration_m_s2: float = _MASTER["acceleration_m_s2"]
 
     def __post_init__(self) -> None:
-        _check_numbers(self, "acceleration_mps2")
+        _check_numbers(self, "acceleration_m_s2")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,7 +125,7 @@ class ConstantVelocity:
     ----------
     velocity_psd : float
         Power spectral density of the white accelerations, m^2/s^3, not negative.
-    sigma_acceleration_mps2 : float
+    sigma_acceleration_m_s2 : float
         Standard deviation of the acceleration that a manoeuvre begins with, m/s^2, not negative.
 
     Raises
@@ -135,10 +135,10 @@ class ConstantVelocity:
     """
 
     velocity_psd: float = _IMM["straight"]["velocity_psd"]
-    sigma_acceleration_mps2: float = _IMM["straight"]["sigma_acceleration_mps2"]
+    sigma_acceleration_m_s2: float = _IMM["straight"]["sigma_acceleration_m_s2"]
 
     def __post_init__(self) -> None:
-        _check_numbers(self, "velocity_psd", "sigma_acceleration_mps2")
+        _check_numbers(self, "velocity_psd", "sigma_acceleration_m_s2")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,7 +150,7 @@ class CoordinatedTurn:
     position_psd, velocity_psd, acceleration_psd : float
         Power spectral densities of the white noises that drive the three pairs of states, in
         m^2/s, m^2/s^3 and m^2/s^5; not negative.
-    slow_mps : float
+    slow_m_s : float
         Speed far below which a direction of motion cannot be told, m/s, positive.
 
     Raises
@@ -162,11 +162,11 @@ class CoordinatedTurn:
     position_psd: float = _IMM["turning"]["position_psd"]
     velocity_psd: float = _IMM["turning"]["velocity_psd"]
     acceleration_psd: float = _IMM["turning"]["acceleration_psd"]
-    slow_mps: float = _IMM["turning"]["slow_mps"]
+    slow_m_s: float = _IMM["turning"]["slow_m_s"]
 
     def __post_init__(self) -> None:
         _check_numbers(self, "position_psd", "velocity_psd", "acceleration_psd")
-        object.__setattr__(self, "slow_mps", as_number("slow_mps", self.slow_mps, "positive"))
+        object.__setattr__(self, "slow_m_s", as_number("slow_m_s", self.slow_m_s, "positive"))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -110,7 +110,7 @@ def test_variants_reach_the_filter() -> None:
     wild = replace(SHORT, outlier=0.1, runs=20)
     bare, gated = (simulate(EkfSlat(START, CERTAIN, gate=g), wild).rmse_m for g in (0, 16))
     assert bare > 3 * gated
-    stiff = EkfSlat(START, CERTAIN, master=PiecewiseAcceleration(acceleration_mps2=0))
+    stiff = EkfSlat(START, CERTAIN, master=PiecewiseAcceleration(acceleration_m_s2=0))
     turning = SlatScenario(runs=5)
     assert simulate(stiff, turning).rmse_m < 50
     assert simulate(stiff, replace(turning, plan_known=False)).rmse_m > 100
@@ -137,11 +137,11 @@ def test_rmse_is_the_mean_over_runs_of_the_root_over_time() -> None:
         (lambda: SlatScenario(duration_s=1e12), "runs . pings must lie in"),
         (lambda: SlatScenario(dropout=1.5), r"dropout must lie in 0\.\.1, not 1.5"),
         (lambda: SlatScenario(odometry_per_ping=0), "odometry_per_ping must lie in 1"),
-        (lambda: SlatScenario(sigma_speed_mps=-1), "sigma_speed_mps must not be negative"),
+        (lambda: SlatScenario(sigma_speed_m_s=-1), "sigma_speed_m_s must not be negative"),
         (lambda: SlatScenario(identified=1), "identified must be True or False"),
         (lambda: SlatScenario(runs=0), "runs must lie in 1"),
         (lambda: SlatScenario(seed=2**64), "seed must lie in"),
-        (lambda: Vehicle(speed_mps=np.nan), "speed_mps must be finite"),
+        (lambda: Vehicle(speed_m_s=np.nan), "speed_m_s must be finite"),
         (lambda: paper_masters(5), r"count must lie in 1\.\.4"),
         (lambda: simulate(3), "filter must be an auvest.Slatf"),
         (lambda: simulate(Slatf(START, CERTAIN), 3), "scenario must be an auvest.SlatScenario"),

@@ -197,7 +197,7 @@ def test_the_seed_decides() -> None:
 
 @pytest.mark.parametrize("compensate", [True, False])
 def test_dead_reckoning_is_equation_2(compensate: bool) -> None:
-    motion = CompassMotion(sigma_speed_mps=1.5, sigma_heading_rad=0.2, compensate_bias=compensate)
+    motion = CompassMotion(sigma_speed_m_s=1.5, sigma_heading_rad=0.2, compensate_bias=compensate)
     filter_ = DeadReckoning([10, -3], np.diag([0.5, 0.25]), motion=motion)
     filter_.predict(2.0, [4.0, 0.7])
     reach = 2.0 * (np.exp(0.02) if compensate else 1.0)
@@ -217,7 +217,7 @@ def test_ekf_slat_is_the_textbook_filter(bearing: Any) -> None:
     q, dt = 0.02, 0.5
     sonar = Sonar(sigma_range_m=2, sigma_bearing_rad=0.1, bearing=bearing)
     p0 = np.array([[4.0, 1.0], [1.0, 9.0]])
-    filter_ = EkfSlat(START, p0, master=PiecewiseAcceleration(acceleration_mps2=q), sonar=sonar)
+    filter_ = EkfSlat(START, p0, master=PiecewiseAcceleration(acceleration_m_s2=q), sonar=sonar)
     filter_.add_master(MASTER_X, 25 * np.eye(6))
     filter_.add_master(SECOND_X, 16 * np.eye(6))
     changes = np.array([[0.2, -0.1], [0.05, 0.3]])
@@ -233,7 +233,7 @@ def test_ekf_slat_is_the_textbook_filter(bearing: Any) -> None:
     c, s = np.cos(0.4), np.sin(0.4)
     g = reach * np.array([[c, -5 * s], [s, 5 * c]])
     Q = np.zeros((14, 14))
-    Q[:2, :2] = g @ np.diag([motion.sigma_speed_mps**2, motion.sigma_heading_rad**2]) @ g.T
+    Q[:2, :2] = g @ np.diag([motion.sigma_speed_m_s**2, motion.sigma_heading_rad**2]) @ g.T
     phi1 = np.eye(6) + dt * np.eye(6, k=2) + dt**2 / 2 * np.eye(6, k=4)
     gain = np.kron(np.array([[dt**2 / 2], [dt], [1.0]]), np.eye(2))
     Phi = np.eye(14)
@@ -321,7 +321,7 @@ def test_an_unknown_echo_goes_to_its_master() -> None:
 
 
 def test_a_master_is_born_from_an_unknown_echo() -> None:
-    filter_ = Slatf(START, CERTAIN, gate=16, birth_velocity_mps=2)
+    filter_ = Slatf(START, CERTAIN, gate=16, birth_velocity_m_s=2)
     assert filter_.masters == 0
     filter_.update([100, np.pi / 2])  # the bearing points from the master to the slave
     assert filter_.masters == 1
@@ -401,8 +401,8 @@ BAD_MAKE: list[tuple[dict[str, Any], str]] = [
     ({"resample_below": 1.5}, r"resample_below must lie in 0\.\.1, not 1.5"),
     ({"gate": -1}, "gate must not be negative"),
     ({"carry_covariance": 1}, "carry_covariance must be True or False"),
-    ({"birth_velocity_mps": 1}, "birth_velocity_mps needs a gate"),
-    ({"birth_acceleration_mps2": 0}, "birth_acceleration_mps2 must be positive"),
+    ({"birth_velocity_m_s": 1}, "birth_velocity_m_s needs a gate"),
+    ({"birth_acceleration_m_s2": 0}, "birth_acceleration_m_s2 must be positive"),
     ({"motion": Sonar()}, "motion must be an auvest.CompassMotion or auvest.UnicycleMotion"),
     ({"master": None}, "master must be an auvest.PiecewiseAcceleration"),
     ({"sonar": 3}, "sonar must be an auvest.Sonar, not int"),
@@ -478,11 +478,11 @@ def test_a_bad_call_is_refused_and_changes_nothing(
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: CompassMotion(sigma_speed_mps=-1), "sigma_speed_mps must not be negative"),
+        (lambda: CompassMotion(sigma_speed_m_s=-1), "sigma_speed_m_s must not be negative"),
         (lambda: CompassMotion(sigma_heading_rad=4), "sigma_heading_rad must be at most 3"),
         (lambda: CompassMotion(compensate_bias=0), "compensate_bias must be True or False"),
-        (lambda: UnicycleMotion(sigma_yaw_rate_radps=np.nan), "sigma_yaw_rate_radps must be fin"),
-        (lambda: PiecewiseAcceleration(acceleration_mps2=-1), "acceleration_mps2 must not be neg"),
+        (lambda: UnicycleMotion(sigma_yaw_rate_rad_s=np.nan), "sigma_yaw_rate_rad_s must be fin"),
+        (lambda: PiecewiseAcceleration(acceleration_m_s2=-1), "acceleration_m_s2 must not be neg"),
         (lambda: Sonar(sigma_range_m=0), "sigma_range_m must be positive"),
         (lambda: Sonar(sigma_bearing_rad=1e-7), "sigma_bearing_rad must be above 1e-6"),
         (lambda: Sonar(bearing="north"), "bearing must be 'master_to_slave'"),
@@ -530,9 +530,9 @@ def test_missing_echoes_change_nothing() -> None:
 
 def test_defaults_are_those_of_the_core() -> None:
     """One default, in C++: section 7's noise."""
-    assert (CompassMotion().sigma_speed_mps, CompassMotion().sigma_heading_rad) == (2, 0.3)
+    assert (CompassMotion().sigma_speed_m_s, CompassMotion().sigma_heading_rad) == (2, 0.3)
     assert (Sonar().sigma_range_m, Sonar().sigma_bearing_rad) == (1, 0.06)
-    assert PiecewiseAcceleration().acceleration_mps2 == 1e-4
+    assert PiecewiseAcceleration().acceleration_m_s2 == 1e-4
     assert available_lanes("float64") == ("scalar",)
     assert available_lanes()[0] == "scalar"
     assert fresh().lanes == "scalar"

@@ -54,23 +54,23 @@ YAW_RATE_DENSITY = 0.033
 DRIFT_S = 10.0
 
 MOTION = UnicycleMotion(
-    sigma_speed_mps=SPEED_DENSITY / STEP_S**0.5,
-    sigma_yaw_rate_radps=YAW_RATE_DENSITY / STEP_S**0.5,
+    sigma_speed_m_s=SPEED_DENSITY / STEP_S**0.5,
+    sigma_yaw_rate_rad_s=YAW_RATE_DENSITY / STEP_S**0.5,
 )
 SONAR = Sonar(sigma_range_m=0.12, sigma_bearing_rad=0.02, bearing="from_heading")
 GATE = 16.0
-STRAIGHT = ConstantVelocity(velocity_psd=1e-3, sigma_acceleration_mps2=0.03)
+STRAIGHT = ConstantVelocity(velocity_psd=1e-3, sigma_acceleration_m_s2=0.03)
 MASTER = Imm(
     straight=STRAIGHT,
     accelerated=ConstantAcceleration(position_psd=0, velocity_psd=0, acceleration_psd=1e-4),
-    turning=CoordinatedTurn(position_psd=0, velocity_psd=0, acceleration_psd=1e-5, slow_mps=0.02),
+    turning=CoordinatedTurn(position_psd=0, velocity_psd=0, acceleration_psd=1e-5, slow_m_s=0.02),
     share=(0.6, 0.2, 0.2),
     switch_rate_hz=0.1,
 )
 ONE_MODEL = Imm(straight=STRAIGHT, share=(1, 0, 0), switch_rate_hz=0)
 #: Standard deviations of what is not known of a master when it is first seen.
 BIRTH_VELOCITY_MPS = 0.05
-BIRTH_ACCELERATION_MPS2 = 0.03
+BIRTH_ACCELERATION_M_S2 = 0.03
 
 NAMES = {
     "dead_reckoning": "dead reckoning",
@@ -261,7 +261,7 @@ def first_seen(pose: Floats, z: Floats) -> tuple[Floats, Floats]:
     state = np.zeros(6)
     state[:2] = pose[:2] + z[0] * ahead
     covariance = np.diag(
-        np.repeat([0, BIRTH_VELOCITY_MPS, BIRTH_ACCELERATION_MPS2], 2).astype(float) ** 2
+        np.repeat([0, BIRTH_VELOCITY_MPS, BIRTH_ACCELERATION_M_S2], 2).astype(float) ** 2
     )
     covariance[:2, :2] = SONAR.sigma_range_m**2 * np.outer(ahead, ahead)
     covariance[:2, :2] += (z[0] * SONAR.sigma_bearing_rad) ** 2 * np.outer(aside, aside)
@@ -405,7 +405,7 @@ keep both limits.
 - The slave starts at its true pose, which it knows. Of the master the filter knows its first
   sighting:
   a place with the covariance of range and bearing there, velocity 0 +- {BIRTH_VELOCITY_MPS} m/s,
-  acceleration 0 +- {BIRTH_ACCELERATION_MPS2} m/s^2 on each axis. No track has a setting of its
+  acceleration 0 +- {BIRTH_ACCELERATION_M_S2} m/s^2 on each axis. No track has a setting of its
   own, and
   nothing looks ahead.
 - Slave: speed and yaw rate, means of the commands over steps of about {STEP_S} s, calibrated: speed

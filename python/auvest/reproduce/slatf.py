@@ -42,7 +42,7 @@ BEST_LEVEL = LEVELS[3]
 #: Particles of the variant with more of them.
 MANY = 1000
 #: q tried where the filter does not know the master's plan, m/s^2.
-UNPLANNED_MPS2 = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
+UNPLANNED_M_S2 = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ def measure(
 
 
 #: Simulations of _variants().
-_VARIANT_JOBS = 2 + 3 + 2 * 2 + 3 + 1 + len(UNPLANNED_MPS2)
+_VARIANT_JOBS = 2 + 3 + 2 * 2 + 3 + 1 + len(UNPLANNED_M_S2)
 
 
 def _variants(
@@ -155,9 +155,9 @@ def _variants(
         {name: rmse(fly(name, scenario, compensate_bias=False)) for name in listeners},
     )
     for sigma in (0.02, 0.5):
-        changed = replace(scenario, prior_velocity_mps=sigma)
+        changed = replace(scenario, prior_velocity_m_s=sigma)
         yield Variant(
-            f"master's velocity told to {sigma:g} m/s instead of {scenario.prior_velocity_mps:g}",
+            f"master's velocity told to {sigma:g} m/s instead of {scenario.prior_velocity_m_s:g}",
             {name: rmse(fly(name, changed)) for name in ("slatf2", "ekf_slat")},
         )
     slow = replace(scenario, odometry_s=2.0, odometry_per_ping=1)
@@ -169,11 +169,11 @@ def _variants(
         {"slatf2": rmse(fly("slatf2", scenario, carry_covariance=True))},
     )
     unplanned = replace(scenario, plan_known=False)
-    tried = {q: rmse(fly("ekf_slat", unplanned, acceleration_mps2=q)) for q in UNPLANNED_MPS2}
+    tried = {q: rmse(fly("ekf_slat", unplanned, acceleration_m_s2=q)) for q in UNPLANNED_M_S2}
     best = min(tried, key=lambda q: tried[q].value)
     yield Variant(
         f"u(k) of the master unknown; q = {best:g} m/s^2, the best of "
-        + ", ".join(f"{q:g}" for q in UNPLANNED_MPS2),
+        + ", ".join(f"{q:g}" for q in UNPLANNED_M_S2),
         {"ekf_slat": tried[best]},
     )
 

@@ -177,7 +177,7 @@ TEST_CASE("process models") {
   check_process(auvest::ExactAcceleration<double>(), 30);
   check_process(auvest::ConstantVelocity<double>(), 0.7);
   auvest::CoordinatedTurn<double>::Params turn;
-  turn.slow_mps = 5;  // the random states turn by up to 2 rad/s
+  turn.slow_m_s = 5;  // the random states turn by up to 2 rad/s
   check_process(auvest::CoordinatedTurn<double>(turn), 0.5);
   check_process(auvest::CoordinatedTurn<double>(turn), 0.01);  // its series
   check_process(driven(auvest::SpeedHeading<double>()), 0.5);
@@ -269,7 +269,7 @@ TEST_CASE("constant velocity: an acceleration has no memory, but where no time p
   CHECK(belief.x == (Vector<double, 6>() << 7, 10, 3, 4, 0, 0).finished());
   CHECK(belief.P(4, 0) == 0);
   CHECK(belief.P(4, 4) ==
-        model.params.sigma_acceleration_mps2 * model.params.sigma_acceleration_mps2);
+        model.params.sigma_acceleration_m_s2 * model.params.sigma_acceleration_m_s2);
   // White noise of density q over dt: q dt^3/3, q dt^2/2, q dt (and the motion of P itself).
   CHECK(belief.P(0, 0) == close_to(1 + 4 + 1e-4 * 8 / 3, 1e-14));
   CHECK(belief.P(2, 0) == close_to(2 + 1e-4 * 4 / 2, 1e-14));
@@ -280,7 +280,7 @@ template <class Scalar>
 void check_circle(double tolerance) {
   // 5 m/s on a circle of 20 m about (0, 0), counter-clockwise and clockwise.
   typename auvest::CoordinatedTurn<Scalar>::Params params;
-  params.slow_mps = Scalar(1e-4);
+  params.slow_m_s = Scalar(1e-4);
   const auvest::CoordinatedTurn<Scalar> model(params);
   for (const double omega : {0.25, -0.25}) {
     const auto on_circle = [omega](double angle) {
@@ -605,10 +605,10 @@ TEST_CASE("models refuse bad parameters") {
   CHECK(auvest::CoordinatedTurn<double>(turn).check() == auvest::Status::kBadParameter);
   turn.noise = auvest::AccelerationNoise<double>();
   CHECK(auvest::CoordinatedTurn<double>(turn).check() == auvest::Status::kOk);
-  turn.slow_mps = 0;
+  turn.slow_m_s = 0;
   CHECK(auvest::CoordinatedTurn<double>(turn).check() == auvest::Status::kBadParameter);
   auvest::ConstantVelocity<double>::Params straight;
-  straight.sigma_acceleration_mps2 = -1;
+  straight.sigma_acceleration_m_s2 = -1;
   CHECK(auvest::ConstantVelocity<double>(straight).check() == auvest::Status::kBadParameter);
 }
 

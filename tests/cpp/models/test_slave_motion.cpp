@@ -89,7 +89,7 @@ TEST_CASE("slave motion: Phi and G Q G' are those of f1") {
   check_motion(Compass(compass), Vector<double, 2>(2, 0.3));
   Unicycle::Params unicycle;
   check_motion(Unicycle(unicycle),
-               Vector<double, 2>(unicycle.sigma_speed_mps, unicycle.sigma_yaw_rate_radps));
+               Vector<double, 2>(unicycle.sigma_speed_m_s, unicycle.sigma_yaw_rate_rad_s));
 }
 
 template <class Motion>
@@ -168,14 +168,14 @@ TEST_CASE("unicycle motion: one step's noise has rank 2, the heading stays wrapp
 TEST_CASE("slave motion: bad parameters") {
   Compass::Params compass;
   CHECK(Compass(compass).check() == auvest::Status::kOk);
-  compass.sigma_speed_mps = -1;
+  compass.sigma_speed_m_s = -1;
   CHECK(Compass(compass).check() == auvest::Status::kBadParameter);
-  compass.sigma_speed_mps = 1;
+  compass.sigma_speed_m_s = 1;
   compass.sigma_heading_rad = 4;
   CHECK(Compass(compass).check() == auvest::Status::kBadParameter);
   Unicycle::Params unicycle;
   CHECK(Unicycle(unicycle).check() == auvest::Status::kOk);
-  unicycle.sigma_yaw_rate_radps = std::nan("");
+  unicycle.sigma_yaw_rate_rad_s = std::nan("");
   CHECK(Unicycle(unicycle).check() == auvest::Status::kBadParameter);
 }
 

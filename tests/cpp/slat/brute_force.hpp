@@ -95,7 +95,7 @@ struct FarApart {
 
   static Compass<double>::Params small_noise() {
     Compass<double>::Params p;
-    p.sigma_speed_mps = 0.2;
+    p.sigma_speed_m_s = 0.2;
     p.sigma_heading_rad = 0.01;
     return p;
   }

@@ -43,7 +43,7 @@ Belief<Scalar, 6> master_belief(double x, double y) {
 TEST_CASE_TEMPLATE("EKF-SLAT: with a slave that is known it is the EKF of the master, bit for bit",
                    Scalar, float, double) {
   typename Compass<Scalar>::Params still;
-  still.sigma_speed_mps = still.sigma_heading_rad = Scalar(0);
+  still.sigma_speed_m_s = still.sigma_heading_rad = Scalar(0);
   auvest::EkfSlat<Compass<Scalar>, Master<Scalar>, 1> slat((Compass<Scalar>(still)),
                                                            Master<Scalar>());
   Random random(1);
@@ -177,10 +177,10 @@ struct Consistency {
   /// The filter believes in Q and R times the given factors.
   Consistency(double q_factor, double r_factor) {
     SlatScenario scenario;
-    scenario.sigma_speed_mps = 0.3;
+    scenario.sigma_speed_m_s = 0.3;
     scenario.sigma_heading_rad = 0.03;
     Compass<double>::Params motion;
-    motion.sigma_speed_mps = scenario.sigma_speed_mps * std::sqrt(q_factor);
+    motion.sigma_speed_m_s = scenario.sigma_speed_m_s * std::sqrt(q_factor);
     motion.sigma_heading_rad = scenario.sigma_heading_rad * std::sqrt(q_factor);
     auvest::Sonar<double>::Params sonar;
     sonar.sigma_range_m = scenario.sigma_range_m * std::sqrt(r_factor);

@@ -345,7 +345,7 @@ TEST_CASE_TEMPLATE("Imm: where one model has probability 1 and no other follows,
 
 TEST_CASE("Imm: with a slave that is known, one particle is the joint filter") {
   Unicycle<double>::Params still;
-  still.sigma_speed_mps = still.sigma_yaw_rate_radps = 0;
+  still.sigma_speed_m_s = still.sigma_yaw_rate_rad_s = 0;
   const Unicycle<double> motion(still);
   EkfSlat<Unicycle<double>, Three<double>, 1> joint(motion, three_models<double>(0.1));
   using Filter = auvest::Slatf1<Unicycle<double>, Three<double>, 1>;
@@ -439,11 +439,11 @@ Three<Scalar> manoeuvring_models() {
   Three<Scalar> master = three_models<Scalar>(0.02);
   typename Straight<Scalar>::Params straight;
   straight.velocity = Scalar(1e-4);
-  straight.sigma_acceleration_mps2 = Scalar(0.3);
+  straight.sigma_acceleration_m_s2 = Scalar(0.3);
   typename Turn<Scalar>::Params turn;
   turn.noise.position = turn.noise.velocity = Scalar(0);
   turn.noise.acceleration = Scalar(1e-4);
-  turn.slow_mps = Scalar(0.1);
+  turn.slow_m_s = Scalar(0.1);
   auvest::AccelerationNoise<Scalar> jerk;
   jerk.position = jerk.velocity = Scalar(0);
   jerk.acceleration = Scalar(1e-4);
@@ -454,8 +454,8 @@ Three<Scalar> manoeuvring_models() {
 template <class Scalar>
 Unicycle<Scalar> drifting() {
   typename Unicycle<Scalar>::Params params;
-  params.sigma_speed_mps = Scalar(0.01);
-  params.sigma_yaw_rate_radps = Scalar(1e-4);
+  params.sigma_speed_m_s = Scalar(0.01);
+  params.sigma_yaw_rate_rad_s = Scalar(1e-4);
   return Unicycle<Scalar>(params);
 }
 

@@ -27,7 +27,7 @@ void check_equals_ekf() {
   using Scalar = typename Filter::Scalar;
   using Process = typename Filter::Master;
   typename Filter::Motion::Params still;
-  still.sigma_speed_mps = still.sigma_heading_rad = Scalar(0);
+  still.sigma_speed_m_s = still.sigma_heading_rad = Scalar(0);
   Owner<Filter> owner((typename Filter::Motion(still)), Process(), 1);
   Filter& slatf = owner.filter;
   Random random(51);
@@ -460,7 +460,7 @@ TEST_CASE_TEMPLATE("SLATF: a master is born from an echo that nobody expects, on
                    auvest::Slatf2<Compass<double>, Master<double>, 2>) {
   typename Filter::Params params;
   params.gate = 16;
-  params.birth_velocity_mps = 2;
+  params.birth_velocity_m_s = 2;
   Owner<Filter> owner((Compass<double>()), Master<double>(), 200, params);
   Filter& filter = owner.filter;
   Random random(88);

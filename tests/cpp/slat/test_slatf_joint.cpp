@@ -196,7 +196,7 @@ TEST_CASE("SlatfJoint: where the sonar is linear the mixture is the Kalman filte
   // resampling over 12 pings of two masters must leave the moments of one Gaussian.
   using Filter = Joint<double, 2>;
   Compass<double>::Params motion;
-  motion.sigma_speed_mps = 0.5;
+  motion.sigma_speed_m_s = 0.5;
   motion.sigma_heading_rad = 0.1;
   auvest::Sonar<double>::Params sonar_params;
   sonar_params.sigma_range_m = 2;

@@ -20,7 +20,7 @@ struct ConstantVelocity : ProcessModel<ConstantVelocity<Scalar_>, Scalar_, 6> {
 
   struct Params {
     Scalar velocity = Scalar(1e-4);                ///< q_v [m^2/s^3]
-    Scalar sigma_acceleration_mps2 = Scalar(0.1);  ///< sigma_a
+    Scalar sigma_acceleration_m_s2 = Scalar(0.1);  ///< sigma_a
   };
 
   Params params;
@@ -78,7 +78,7 @@ struct ConstantVelocity : ProcessModel<ConstantVelocity<Scalar_>, Scalar_, 6> {
 
   Status check() const {
     return math::is_nonnegative(params.velocity) &&
-                   math::is_nonnegative(params.sigma_acceleration_mps2)
+                   math::is_nonnegative(params.sigma_acceleration_m_s2)
                ? Status::kOk
                : Status::kBadParameter;
   }
@@ -106,7 +106,7 @@ struct ConstantVelocity : ProcessModel<ConstantVelocity<Scalar_>, Scalar_, 6> {
       p(i + 2, i) = p(i + 2, i) + vv * dt / Scalar(2);
       p(i + 2, i + 2) = p(i + 2, i + 2) + vv;
       p(i + 4, i + 4) = p(i + 4, i + 4) +
-                        fresh * (params.sigma_acceleration_mps2 * params.sigma_acceleration_mps2);
+                        fresh * (params.sigma_acceleration_m_s2 * params.sigma_acceleration_m_s2);
     }
   }
 };

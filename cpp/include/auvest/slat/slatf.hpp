@@ -44,8 +44,8 @@ struct SlatfParams {
   /// Standard deviations of the velocity [m/s] and the acceleration [m/s^2] of a master that is
   /// born from an echo of kUnknownMaster: where particles with more than half of the weight find
   /// the echo beyond the gate of every master. 0: no births. Needs a gate.
-  Scalar birth_velocity_mps = Scalar(0);
-  Scalar birth_acceleration_mps2 = Scalar(0.01);
+  Scalar birth_velocity_m_s = Scalar(0);
+  Scalar birth_acceleration_m_s2 = Scalar(0.01);
 };
 
 template <class Motion_, class Master_, class Proposal_, int Masters,
@@ -101,8 +101,8 @@ class Slatf {
   Status reset(const SlaveBelief& pose, int particles, math::Random& random) {
     const bool valid =
         particles > 0 && particles <= set_.capacity() && !(params_.resample_below < Scalar(0)) &&
-        !(params_.gate < Scalar(0)) && !(params_.birth_velocity_mps < Scalar(0)) &&
-        params_.birth_acceleration_mps2 > Scalar(0) && (params_.gate > Scalar(0) || !births()) &&
+        !(params_.gate < Scalar(0)) && !(params_.birth_velocity_m_s < Scalar(0)) &&
+        params_.birth_acceleration_m_s2 > Scalar(0) && (params_.gate > Scalar(0) || !births()) &&
         !(params_.resample_below > Scalar(1));
     if (!valid || motion_.check() != Status::kOk || master_.check() != Status::kOk) {
       return Status::kBadParameter;
@@ -447,7 +447,7 @@ class Slatf {
     return check_sightings(sightings, count, births() ? Masters : masters_, sonar, kPose, false);
   }
 
-  bool births() const { return params_.birth_velocity_mps > Scalar(0) && masters_ < Masters; }
+  bool births() const { return params_.birth_velocity_m_s > Scalar(0) && masters_ < Masters; }
 
   AUVEST_INLINE void advance(int begin, int end, const Move& move) const {
     int i = begin;
@@ -783,8 +783,8 @@ class Slatf {
 
   /// A new master where each particle hears sighting s come from.
   void add_master(const Echoes& echoes, int s) {
-    const Scalar velocity = params_.birth_velocity_mps * params_.birth_velocity_mps;
-    const Scalar acceleration = params_.birth_acceleration_mps2 * params_.birth_acceleration_mps2;
+    const Scalar velocity = params_.birth_velocity_m_s * params_.birth_velocity_m_s;
+    const Scalar acceleration = params_.birth_acceleration_m_s2 * params_.birth_acceleration_m_s2;
     for_each([&](int i) {
       Belief<Value, kPose> pose;
       load_pose(i, pose);

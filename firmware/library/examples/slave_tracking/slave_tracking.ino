@@ -36,7 +36,7 @@ constexpr uint32_t kPause = wake_timer::to_ticks(0.05f);  // enough to look at t
 
 Motion::Params readings_noise() {
   Motion::Params params;
-  params.sigma_speed_mps = kSigmaSpeed;
+  params.sigma_speed_m_s = kSigmaSpeed;
   params.sigma_heading_rad = kSigmaHeading;
   return params;
 }
