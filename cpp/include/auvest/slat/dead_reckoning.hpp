@@ -58,6 +58,15 @@ class DeadReckoning {
   Motion motion_;
   SlaveBelief pose_;
   bool initialised_;
+
+ public:
+  /// Hands all numbers of the state to `visit`, which keeps them, or overwrites them by those that
+  /// were kept: to save a filter and to go on from there. `Self` is this class, const to save.
+  template <class Self, class Visit>
+  static void visit_state(Self& self, Visit& visit) {
+    visit(self.pose_);
+    visit.count(self.initialised_, true);
+  }
 };
 
 }  // namespace auvest

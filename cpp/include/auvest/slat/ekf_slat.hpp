@@ -117,6 +117,18 @@ class EkfSlat {
   Scalar nis_ = Scalar(0);
   Scalar log_likelihood_ = Scalar(0);
   bool initialised_;
+
+ public:
+  /// Hands all numbers of the state to `visit`, which keeps them, or overwrites them by those that
+  /// were kept: to save a filter and to go on from there. `Self` is this class, const to save.
+  template <class Self, class Visit>
+  static void visit_state(Self& self, Visit& visit) {
+    visit(self.belief_);
+    visit(self.nis_);
+    visit(self.log_likelihood_);
+    visit.count(self.masters_, Masters);
+    visit.count(self.initialised_, true);
+  }
 };
 
 }  // namespace auvest

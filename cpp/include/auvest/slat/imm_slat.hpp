@@ -331,6 +331,19 @@ class EkfSlat<Motion_, Imm<Models...>, Masters> {
   int masters_ = 0;
   Scalar nis_ = Scalar(0);
   Scalar log_likelihood_ = Scalar(0);
+
+ public:
+  /// Hands all numbers of the state to `visit`, which keeps them, or overwrites them by those that
+  /// were kept: to save a filter and to go on from there. `Self` is this class, const to save.
+  template <class Self, class Visit>
+  static void visit_state(Self& self, Visit& visit) {
+    for (int h = 0; h < kHypotheses; ++h) visit(self.belief_[h]);
+    visit(self.log_weight_);
+    visit(self.nis_);
+    visit(self.log_likelihood_);
+    visit.count(self.hypotheses_, kHypotheses);
+    visit.count(self.masters_, Masters);
+  }
 };
 
 }  // namespace auvest

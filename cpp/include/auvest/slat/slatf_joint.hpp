@@ -302,6 +302,18 @@ class SlatfJoint {
   int resamplings_ = 0;
   Scalar log_likelihood_ = Scalar(0);
   Scalar effective_size_ = Scalar(0);
+
+ public:
+  /// Hands all numbers of the state to `visit`, which keeps them, or overwrites them by those that
+  /// were kept: to save a filter and to go on from there. `Self` is this class, const to save.
+  template <class Self, class Visit>
+  static void visit_state(Self& self, Visit& visit) {
+    visit(self.set_);
+    visit(self.log_likelihood_);
+    visit(self.effective_size_);
+    visit.count(self.masters_, Masters);
+    visit.count(self.resamplings_);
+  }
 };
 
 }  // namespace auvest
