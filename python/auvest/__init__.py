@@ -30,7 +30,7 @@ from auvest.slat import (
     SlatfJoint,
     SlatRun,
 )
-from auvest.slat_models import (
+from auvest.slat.models import (
     CompassMotion,
     ConstantVelocity,
     CoordinatedTurn,
