@@ -32,7 +32,9 @@ UNICYCLE = {
     "sonar": auvest.Sonar(sigma_range_m=0.5, bearing="from_heading"),
 }
 MAKE: dict[str, Callable[..., Any]] = {
-    "slatf1": lambda x, p, **o: auvest.Slatf(x, p, version=1, particles=37, gate=16, **o),
+    "slatf1": lambda x, p, **o: auvest.Slatf(
+        x, p, version=1, particles=37, gate=16, resample_below=0.9, **o
+    ),
     "slatf2": lambda x, p, **o: auvest.Slatf(x, p, particles=37, resampling="residual", **o),
     "slatf_imm": lambda x, p, **o: auvest.Slatf(x, p, particles=20, master=auvest.Imm(), **o),
     "births": lambda x, p, **o: auvest.Slatf(
@@ -45,7 +47,7 @@ MAKE: dict[str, Callable[..., Any]] = {
     "reckoning": lambda x, p, **o: auvest.DeadReckoning(x, p, **o),
 }
 MASTER = ([0, 300, 5, 1.3, 0, 0], np.diag([1, 1, 0.0025, 0.0025, 1e-8, 1e-8]))
-#: (range, bearing, master) at each step; None: unknown. 2.0 and births take them from two places.
+#: (range, bearing) from a heading of 0, from two places; of nobody knows whom.
 HEARD = [(300, 1.6), (310, 1.58), (200, -1.0), (330, 1.55), (205, -1.02), None, (333, 1.5)]
 
 
@@ -73,6 +75,8 @@ def started(name: str, dtype: str) -> Any:
 def drive(filter_: Any, heard: Any) -> None:
     unknown = auvest.UNKNOWN_MASTER
     for k, z in enumerate(heard):
+        if z is not None and filter_.motion.pose_states == 2:
+            z = (z[0], -z[1])  # from the master
         if k % 2:
             filter_.predict(0.5, [5, 0.1])
             filter_.update(z, unknown)
