@@ -10,6 +10,7 @@
 #include "auvest/slat/echo.hpp"
 #include "auvest/slat/ekf_slat.hpp"
 #include "auvest/slat/imm_slat.hpp"
+#include "slat_state.hpp"
 
 namespace auvest {
 
@@ -56,11 +57,15 @@ class AnySlat {
     virtual std::vector<Scalar> mode_probabilities(int n) const = 0;
     /// Weights (particles) and poses (particles x Pose); nothing where there are no particles.
     virtual void particles(Scalar* weights, Scalar* poses) const = 0;
+    virtual SlatState<Scalar> state() const = 0;
+    /// False where it is not the state of such a filter. Then this one must not be used any more.
+    virtual bool restore(const SlatState<Scalar>& state) = 0;
   };
 
   explicit AnySlat(std::unique_ptr<Interface> filter) : filter_(std::move(filter)) {}
   AnySlat(const AnySlat& other) : filter_(other.filter_->clone()) {}
   AnySlat(AnySlat&&) = default;
+  AnySlat& operator=(AnySlat&&) = default;
 
   Status reset(const SlaveBelief& pose, math::Random& random) {
     return filter_->reset(pose, random);
@@ -83,6 +88,14 @@ class AnySlat {
   SlatReadings<Scalar> readings() const { return filter_->readings(); }
   std::vector<Scalar> mode_probabilities(int n) const { return filter_->mode_probabilities(n); }
   void particles(Scalar* weights, Scalar* poses) const { filter_->particles(weights, poses); }
+  SlatState<Scalar> state() const { return filter_->state(); }
+  /// False, with the filter as it was, where it is not the state of such a filter.
+  bool restore(const SlatState<Scalar>& state) {
+    std::unique_ptr<Interface> twin = filter_->clone();
+    if (!twin->restore(state)) return false;
+    filter_ = std::move(twin);
+    return true;
+  }
 
  private:
   std::unique_ptr<Interface> filter_;
@@ -127,6 +140,16 @@ class SlatModel : public AnySlat<typename Filter::Scalar, Filter::kPose>::Interf
     return filter_.update(sightings, count, sonar, random);
   }
   typename Any::SlaveBelief slave() const override { return filter_.slave(); }
+  SlatState<Scalar> state() const override {
+    StateKeeper<Scalar> keeper;
+    Filter::visit_state(filter_, keeper);
+    return keeper.state;
+  }
+  bool restore(const SlatState<Scalar>& state) override {
+    StateReturner<Scalar> returner(state);
+    Filter::visit_state(filter_, returner);
+    return returner.complete();
+  }
 
  protected:
   template <class... Arguments>

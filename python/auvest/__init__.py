@@ -58,13 +58,13 @@ if TYPE_CHECKING:
     from auvest.slat import Slatf as Slatf
     from auvest.slat import SlatfJoint as SlatfJoint
     from auvest.slat import SlatRun as SlatRun
-    from auvest.slat_models import CompassMotion as CompassMotion
-    from auvest.slat_models import ConstantVelocity as ConstantVelocity
-    from auvest.slat_models import CoordinatedTurn as CoordinatedTurn
-    from auvest.slat_models import Imm as Imm
-    from auvest.slat_models import PiecewiseAcceleration as PiecewiseAcceleration
-    from auvest.slat_models import Sonar as Sonar
-    from auvest.slat_models import UnicycleMotion as UnicycleMotion
+    from auvest.slat.models import CompassMotion as CompassMotion
+    from auvest.slat.models import ConstantVelocity as ConstantVelocity
+    from auvest.slat.models import CoordinatedTurn as CoordinatedTurn
+    from auvest.slat.models import Imm as Imm
+    from auvest.slat.models import PiecewiseAcceleration as PiecewiseAcceleration
+    from auvest.slat.models import Sonar as Sonar
+    from auvest.slat.models import UnicycleMotion as UnicycleMotion
 
     __version__: str
 else:
@@ -75,10 +75,10 @@ else:
         "Aukf": "filters",
         "BodyVelocity": "models",
         "Ckf": "filters.ckf",
-        "CompassMotion": "slat_models",
+        "CompassMotion": "slat.models",
         "ConstantAcceleration": "models",
-        "ConstantVelocity": "slat_models",
-        "CoordinatedTurn": "slat_models",
+        "ConstantVelocity": "slat.models",
+        "CoordinatedTurn": "slat.models",
         "CovarianceBudget": "intervals",
         "DeadReckoning": "slat",
         "Decision": "_core",
@@ -92,13 +92,13 @@ else:
         "Hampel": "kernels",
         "Huber": "kernels",
         "Igg": "kernels",
-        "Imm": "slat_models",
+        "Imm": "slat.models",
         "LeaderRange": "models",
         "MahalanobisInterval": "intervals",
         "MeasurementModel": "models",
         "Odometry": "models",
         "Outage": "slat",
-        "PiecewiseAcceleration": "slat_models",
+        "PiecewiseAcceleration": "slat.models",
         "Position": "models",
         "ProcessModel": "models",
         "RangeBearing": "models",
@@ -113,12 +113,12 @@ else:
         "SlatRun": "slat",
         "Slatf": "slat",
         "SlatfJoint": "slat",
-        "Sonar": "slat_models",
+        "Sonar": "slat.models",
         "SpeedHeading": "models",
         "Status": "_core",
         "UNKNOWN_MASTER": "slat",
         "Ukf": "filters",
-        "UnicycleMotion": "slat_models",
+        "UnicycleMotion": "slat.models",
         "Unit": "kernels",
         "WhiteAcceleration": "models",
         "self_test": "_core",

@@ -20,6 +20,7 @@ from auvest import (
     Outage,
     PiecewiseAcceleration,
     Slatf,
+    SlatfJoint,
     Sonar,
     Status,
     UnicycleMotion,
@@ -573,6 +574,106 @@ def test_missing_echoes_change_nothing() -> None:
     filter_.update([[np.nan, np.nan], [300, -1.5]], [0, 1])
     twin.update([300, -1.5], 1)
     assert np.array_equal(filter_.poses, twin.poses)
+
+
+@pytest.mark.parametrize("make", [Slatf, SlatfJoint, EkfSlat, DeadReckoning])
+def test_nan_rows_of_a_record_are_as_if_they_were_not_there(make: Any) -> None:
+    data = record(10, masters=1)
+    there = np.arange(len(data["z"])) % 3 != 1
+    gaps = {**data, "z": np.where(there[:, None], data["z"], np.nan)}
+    less = {**data, **{name: data[name][there] for name in ("z", "z_time_s", "master")}}
+    silent = {**gaps, "z": np.full_like(data["z"], np.nan)}
+    nothing = {name: data[name] for name in ("time_s", "u", "changes")}
+    for one, other in ((gaps, less), (silent, nothing)):
+        made = [with_masters(make(START, CERTAIN), 1) for _ in range(2)]
+        runs = [filter_.run(**each) for filter_, each in zip(made, (one, other), strict=True)]
+        assert everything(made[0], runs[0]) == everything(made[1], runs[1])
+        assert made[0].save() == made[1].save()
+
+
+def test_a_result_has_the_times_of_its_rows() -> None:
+    data = record(10)
+    result = with_masters(EkfSlat(START, CERTAIN)).run(**data)
+    assert np.array_equal(result.time_s, data["time_s"][1:])
+    frame = result.to_pandas(["x", "masters_x"])
+    assert list(frame.index) == list(data["time_s"][1:])
+    assert list(frame)[:4] == ["x_0", "x_1", "masters_x_0_0", "masters_x_0_1"]
+    assert list(frame["masters_x_1_3"]) == list(result.masters_x[:, 1, 3])
+
+
+def wide(value: Any) -> Any:
+    """Every other column of a wider array: not contiguous."""
+    array = np.asarray(value, float)
+    return np.repeat(array, 2, axis=-1)[..., ::2]
+
+
+#: (dt, u, z, master) that mean the same, as users may write them.
+SAME: list[tuple[Any, Any, Any, Any]] = [
+    (2.0, np.array([5, 0.5]), np.array([300.0, -1.5]), 0),
+    (2, [5, 0.5], [300, -1.5], 0),
+    (np.float64(2), (5.0, 0.5), (300, -1.5), np.int32(0)),
+    (np.float32(2), np.array([5, 0.5], np.float32), np.array([[300, -1.5]], np.float32), [0]),
+    (np.array(2.0), np.array([5, 0.5], np.float16), [[300, -1.5]], np.array([0])),
+    (2, wide([5, 0.5]), wide([300, -1.5]), np.array(0)),
+    (2, [np.float32(5), 0.5], wide([[300, -1.5]]), np.array([0], np.uint8)),
+    (2, np.array([5, 0.5], ">f8"), np.array([300, -1.5], ">f4"), 0),
+    (2, [5, 0.5], [[np.nan, np.nan], [300, -1.5]], [1, 0]),
+    (2, [5, 0.5], np.array([[300, -1.5]] + 9 * [[np.nan] * 2]), [0] + 9 * [1]),
+]
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_numbers_mean_the_same_however_they_are_written(dtype: Any) -> None:
+    states = []
+    for dt, u, z, master in SAME:
+        for fused in (False, True):
+            filter_ = with_masters(Slatf(START, CERTAIN, dtype=dtype))
+            if fused:
+                filter_.step(dt, u, z, master)
+            else:
+                filter_.predict(dt, u)
+                filter_.update(z, master)
+            states.append(filter_.save())
+    assert set(states) == {states[0]}
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_plans_mean_the_same_however_they_are_written(dtype: Any) -> None:
+    plan = [[1, 2], [0.5, -0.25]]
+    states = []
+    for changes in (plan, np.array(plan, dtype), np.array(plan, np.float16), wide(plan)):
+        filter_ = with_masters(EkfSlat(START, CERTAIN, dtype=dtype))
+        filter_.predict(2, [5, 0.5], changes=changes)
+        assert filter_.master(1)[0][2] == SECOND_X[2] + 0.5
+        states.append(filter_.save())
+    assert set(states) == {states[0]}
+
+
+def test_what_is_no_number_is_not_taken_for_one() -> None:
+    filter_ = fresh()
+    masked = np.ma.masked_array([300.0, -1.5], mask=[True, False])
+    bad: list[tuple[Callable[[], object], str]] = [
+        (lambda: filter_.predict(True, [5, 0]), "dt must be a number, not bool"),
+        (lambda: filter_.predict("1", [5, 0]), "dt must be a number, not str"),  # type: ignore[arg-type]
+        (lambda: filter_.predict(10**400, [5, 0]), "dt must be finite"),
+        (lambda: filter_.predict(1, [5, None]), "u must be an array"),  # type: ignore[list-item]
+        (lambda: filter_.predict(1, [5, 10**400]), "u must be an array"),
+        (lambda: filter_.predict(1, masked), "u must be .* not a masked array"),
+        (lambda: filter_.update(masked, 0), "z must be .* not a masked array"),
+        (lambda: filter_.update([300, -1.5], True), "master must be an int"),
+        (lambda: filter_.update([300, -1.5], 2**80), "master"),
+        (lambda: filter_.update(np.zeros((1, 1, 2)), 0), "z has shape"),
+        (lambda: filter_.update(np.zeros((5, 2)), [0, 1, 2, 3, 4]), "master is 2"),
+        (lambda: filter_.update(np.zeros((5, 2)), -1), "z has 5 echoes; at most 4"),
+    ]
+    for call, message in bad:
+        with pytest.raises((ValueError, TypeError), match=message):
+            call()
+    single = Slatf(START, CERTAIN, dtype="float32")
+    with pytest.raises(ValueError, match=r"u\[0\] is 1e\+39: beyond the range of float32"):
+        single.predict(1, [1e39, 0])
+    with pytest.raises(ValueError, match=r"dt = 1e\+39 is beyond the range of float32"):
+        single.predict(1e39, [5, 0])
 
 
 def test_defaults_are_those_of_the_core() -> None:

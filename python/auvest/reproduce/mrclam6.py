@@ -70,7 +70,7 @@ MASTER = Imm(
 ONE_MODEL = Imm(straight=STRAIGHT, share=(1, 0, 0), switch_rate_hz=0)
 #: Standard deviations of what is not known of a master when it is first seen.
 BIRTH_VELOCITY_MPS = 0.05
-BIRTH_ACCELERATION_MPS2 = 0.03
+BIRTH_ACCELERATION_M_S2 = 0.03
 
 NAMES = {
     "dead_reckoning": "dead reckoning",
@@ -261,7 +261,7 @@ def first_seen(pose: Floats, z: Floats) -> tuple[Floats, Floats]:
     state = np.zeros(6)
     state[:2] = pose[:2] + z[0] * ahead
     covariance = np.diag(
-        np.repeat([0, BIRTH_VELOCITY_MPS, BIRTH_ACCELERATION_MPS2], 2).astype(float) ** 2
+        np.repeat([0, BIRTH_VELOCITY_MPS, BIRTH_ACCELERATION_M_S2], 2).astype(float) ** 2
     )
     covariance[:2, :2] = SONAR.sigma_range_m**2 * np.outer(ahead, ahead)
     covariance[:2, :2] += (z[0] * SONAR.sigma_bearing_rad) ** 2 * np.outer(aside, aside)
@@ -405,7 +405,7 @@ keep both limits.
 - The slave starts at its true pose, which it knows. Of the master the filter knows its first
   sighting:
   a place with the covariance of range and bearing there, velocity 0 +- {BIRTH_VELOCITY_MPS} m/s,
-  acceleration 0 +- {BIRTH_ACCELERATION_MPS2} m/s^2 on each axis. No track has a setting of its
+  acceleration 0 +- {BIRTH_ACCELERATION_M_S2} m/s^2 on each axis. No track has a setting of its
   own, and
   nothing looks ahead.
 - Slave: speed and yaw rate, means of the commands over steps of about {STEP_S} s, calibrated: speed

@@ -15,7 +15,7 @@ import numpy as np
 from auvest.scenarios.paper_aukf import Assumption, DTypeName
 from auvest.scenarios.slat import SlatScenario
 from auvest.slat import DeadReckoning, EkfSlat, Slatf, SlatFilter, SlatfJoint
-from auvest.slat_models import PiecewiseAcceleration
+from auvest.slat.models import PiecewiseAcceleration
 
 #: The columns of Table 1, ours beside the paper's.
 FilterName: TypeAlias = Literal[

@@ -19,7 +19,7 @@ from auvest import _core, metrics, montecarlo
 from auvest._arguments import as_flag, as_instance, as_integer, as_number
 from auvest._core import Status
 from auvest.slat import MAX_MASTERS, DeadReckoning, EkfSlat, Slatf, SlatFilter, SlatfJoint
-from auvest.slat_models import CompassMotion, Sonar, core_sonar
+from auvest.slat.models import CompassMotion, Sonar, core_sonar
 
 _DEFAULTS = _core.slat_scenario_defaults()
 _PARAMS = _DEFAULTS["params"]

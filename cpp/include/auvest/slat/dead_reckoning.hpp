@@ -56,6 +56,13 @@ class DeadReckoning : public SlatFilter<Motion_, 0> {
     return pose;
   }
 
+  /// As SlatFilter::visit_state.
+  template <class Self, class Visit>
+  static void visit_state(Self& self, Visit& visit) {
+    Frame::visit_state(self, visit);
+    visit(self.pose_);
+  }
+
  private:
   Motion motion_;
   SlaveBelief pose_;

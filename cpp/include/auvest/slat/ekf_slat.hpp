@@ -102,6 +102,14 @@ class EkfSlat : public SlatFilter<Motion_, Masters> {
   const BeliefType& belief() const { return belief_; }
   Scalar nis() const { return nis_; }  ///< of the last update: chi-square, 2 degrees per echo
 
+  /// As SlatFilter::visit_state.
+  template <class Self, class Visit>
+  static void visit_state(Self& self, Visit& visit) {
+    Frame::visit_state(self, visit);
+    visit(self.belief_);
+    visit(self.nis_);
+  }
+
  private:
   using Frame::log_likelihood_;
   using Frame::masters_;

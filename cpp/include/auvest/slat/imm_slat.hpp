@@ -273,6 +273,16 @@ class EkfSlat<Motion_, Imm<Models...>, Masters> : public SlatFilter<Motion_, Mas
 
   Scalar nis() const { return nis_; }  ///< of the last update: mean over the hypotheses before it
 
+  /// As SlatFilter::visit_state.
+  template <class Self, class Visit>
+  static void visit_state(Self& self, Visit& visit) {
+    Frame::visit_state(self, visit);
+    for (int h = 0; h < kHypotheses; ++h) visit(self.belief_[h]);
+    visit(self.log_weight_);
+    visit.count(self.hypotheses_, kHypotheses);
+    visit(self.nis_);
+  }
+
  private:
   using Weights = Vector<Scalar, kHypotheses>;
   using Frame::log_likelihood_;

@@ -94,6 +94,20 @@ class Outage {
   MasterBelief masters_[Masters];
   int count_ = 0;
   Communication mode_;
+
+ public:
+  int shared_masters() const { return count_; }  ///< of the last shared state
+
+  /// Hands all numbers of the state to `visit`, which keeps them, or overwrites them by those that
+  /// were kept: to save a filter and to go on from there. `Self` is this class, const to save.
+  template <class Self, class Visit>
+  static void visit_state(Self& self, Visit& visit) {
+    visit.count(self.mode_, Communication::kDown);
+    visit.count(self.count_, Masters);
+    if (self.mode_ != Communication::kNever) visit(self.slave_);
+    for (int n = 0; n < self.count_; ++n) visit(self.masters_[n]);
+    visit(self.filter_);
+  }
 };
 
 }  // namespace auvest

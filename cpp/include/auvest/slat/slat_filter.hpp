@@ -39,6 +39,15 @@ class SlatFilter {
   int masters() const { return masters_; }
   Scalar log_likelihood() const { return log_likelihood_; }  ///< of all echoes since reset
 
+  /// Hands all numbers of the state to `visit`, which keeps them, or overwrites them by those that
+  /// were kept: to save a filter and to go on from there. `Self` is this class, const to save.
+  template <class Self, class Visit>
+  static void visit_state(Self& self, Visit& visit) {
+    visit.count(self.initialised_, true);
+    visit.count(self.masters_, Masters);
+    visit(self.log_likelihood_);
+  }
+
  protected:
   /// What the log density of an echo has beside that of log_density(): log(2 pi), for two numbers.
   static constexpr Scalar density_constant() { return Scalar(1.8378770664); }
@@ -106,6 +115,15 @@ class ParticleSlatFilter : public SlatFilter<Motion, Masters> {
   Scalar effective_size() const { return effective_size_; }  ///< N_eff before any resampling
   int resamplings() const { return resamplings_; }           ///< since reset
   const Set& set() const { return set_; }
+
+  /// As SlatFilter::visit_state.
+  template <class Self, class Visit>
+  static void visit_state(Self& self, Visit& visit) {
+    Frame::visit_state(self, visit);
+    visit(self.set_);
+    visit(self.effective_size_);
+    visit.count(self.resamplings_);
+  }
 
  protected:
   /// The particles live in `storage`, which holds at least Set::storage_size(capacity) numbers and
