@@ -44,11 +44,11 @@ class AnySlat {
     virtual Status add_master(const MasterBelief& belief) = 0;
     virtual Status predict(Scalar dt, const Control& u, math::Random& random,
                            const VelocityChange* changes) = 0;
-    virtual Status update(const Echo* sightings, int count, const Sonar<Scalar>& sonar,
+    virtual Status update(const Echo* echoes, int count, const Sonar<Scalar>& sonar,
                           math::Random& random) = 0;
     /// predict() and update(), both or, where one is refused, neither.
     virtual Status step(Scalar dt, const Control& u, const VelocityChange* changes,
-                        const Echo* sightings, int count, const Sonar<Scalar>& sonar,
+                        const Echo* echoes, int count, const Sonar<Scalar>& sonar,
                         math::Random& random) = 0;
     virtual SlaveBelief slave() const = 0;
     virtual MasterBelief master(int n) const = 0;
@@ -75,13 +75,13 @@ class AnySlat {
                  const VelocityChange* changes = nullptr) {
     return filter_->predict(dt, u, random, changes);
   }
-  Status update(const Echo* sightings, int count, const Sonar<Scalar>& sonar,
+  Status update(const Echo* echoes, int count, const Sonar<Scalar>& sonar,
                 math::Random& random) {
-    return filter_->update(sightings, count, sonar, random);
+    return filter_->update(echoes, count, sonar, random);
   }
-  Status step(Scalar dt, const Control& u, const VelocityChange* changes, const Echo* sightings,
+  Status step(Scalar dt, const Control& u, const VelocityChange* changes, const Echo* echoes,
               int count, const Sonar<Scalar>& sonar, math::Random& random) {
-    return filter_->step(dt, u, changes, sightings, count, sonar, random);
+    return filter_->step(dt, u, changes, echoes, count, sonar, random);
   }
   SlaveBelief slave() const { return filter_->slave(); }
   MasterBelief master(int n) const { return filter_->master(n); }
@@ -135,9 +135,9 @@ class SlatModel : public AnySlat<typename Filter::Scalar, Filter::kPose>::Interf
                  const typename Any::VelocityChange* changes) override {
     return filter_.predict(dt, u, random, changes);
   }
-  Status update(const typename Any::Echo* sightings, int count, const Sonar<Scalar>& sonar,
+  Status update(const typename Any::Echo* echoes, int count, const Sonar<Scalar>& sonar,
                 math::Random& random) override {
-    return filter_.update(sightings, count, sonar, random);
+    return filter_.update(echoes, count, sonar, random);
   }
   typename Any::SlaveBelief slave() const override { return filter_.slave(); }
   SlatState<Scalar> state() const override {
@@ -179,9 +179,9 @@ class SlatfModel : private std::vector<typename Filter::Scalar>, public SlatMode
     return std::unique_ptr<typename Any::Interface>(new SlatfModel(*this));
   }
   Status step(Scalar dt, const typename Any::Control& u,
-              const typename Any::VelocityChange* changes, const typename Any::Echo* sightings,
+              const typename Any::VelocityChange* changes, const typename Any::Echo* echoes,
               int count, const Sonar<Scalar>& sonar, math::Random& random) override {
-    return this->filter_.step(dt, u, changes, sightings, count, sonar, random);
+    return this->filter_.step(dt, u, changes, echoes, count, sonar, random);
   }
   typename Any::MasterBelief master(int n) const override { return this->filter_.master(n); }
   std::vector<Scalar> mode_probabilities(int n) const override {
@@ -225,11 +225,11 @@ class GaussianSlatModel : public SlatModel<Filter> {
     return std::unique_ptr<typename Any::Interface>(new GaussianSlatModel(*this));
   }
   Status step(Scalar dt, const typename Any::Control& u,
-              const typename Any::VelocityChange* changes, const typename Any::Echo* sightings,
+              const typename Any::VelocityChange* changes, const typename Any::Echo* echoes,
               int count, const Sonar<Scalar>& sonar, math::Random& random) override {
     const Filter before = this->filter_;
     Status status = this->filter_.predict(dt, u, random, changes);
-    if (status == Status::kOk) status = this->filter_.update(sightings, count, sonar, random);
+    if (status == Status::kOk) status = this->filter_.update(echoes, count, sonar, random);
     if (status != Status::kOk) this->filter_ = before;
     return status;
   }
