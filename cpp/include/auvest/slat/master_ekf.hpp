@@ -40,8 +40,8 @@ struct MasterEkf {
     sonar.look(pose, x, y, z, view);  // [SLATF 18] [SLATF 20] [SLATF 22]
     Matrix<Value, 2, 2> a;
     project(view.by_master, root, a);
-    const math::Mask<Value> finite =
-        potter<!math::is_number<Value>()>(a, noise, view.innovation, posterior);  // [SLATF 23] [SLATF 24]
+    const math::Mask<Value> finite = potter<!math::is_number<Value>()>(
+        a, noise, view.innovation, posterior);  // [SLATF 23] [SLATF 24]
     valid = finite && valid;
     if (gate > Scalar(0)) saturate(Value(gate), posterior);
   }

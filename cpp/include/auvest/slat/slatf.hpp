@@ -289,9 +289,9 @@ class Slatf : public SlatfFrame<SlatfParticle<Motion_, Master_, Proposal_, Maste
   template <int Count>
   struct Models {};
 
-  /// Steps 2 and 3 for echo s and master n: by the first kernel [SLATF 22], [SLATF 23] and, for 1.0,
-  /// [SLATF 30] and [SLATF 31]; by the second [SLATF 25] and [SLATF 26]. Where it is not known whose
-  /// the echo is, in those particles that have chosen n.
+  /// Steps 2 and 3 for echo s and master n: by the first kernel [SLATF 22], [SLATF 23] and,
+  /// for 1.0, [SLATF 30] and [SLATF 31]; by the second [SLATF 25] and [SLATF 26]. Where it is not
+  /// known whose the echo is, in those particles that have chosen n.
   AUVEST_INLINE void correct_master(const Tile& tile, const Update& update, int s, int n,
                                     const Value (*chosen)[Masters], Models<1>) {
     MasterEkf<Value> ekfs[Schedule::kGroups];
