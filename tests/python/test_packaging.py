@@ -8,6 +8,7 @@ import zipfile
 from importlib.metadata import version
 
 import pytest
+from conftest import ROOT
 
 import auvest
 
@@ -40,6 +41,9 @@ def test_wheel_contents(wheel):
         names = archive.namelist()
     package = [name for name in names if ".dist-info/" not in name]
     assert {"auvest/__init__.py", "auvest/_core.pyi", "auvest/py.typed"} <= set(package)
+    templates = [*(ROOT / "python").rglob("*.md"), *(ROOT / "python").rglob("*.toml")]
+    assert len(templates) > 10
+    assert {str(path.relative_to(ROOT / "python")) for path in templates} <= set(package)
     assert [name for name in package if re.fullmatch(r"auvest/_core\..*\.so", name)]
     # No tests, no C++, no caches: only the package.
     assert not [name for name in package if not name.startswith("auvest/")]

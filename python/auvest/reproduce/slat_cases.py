@@ -85,7 +85,7 @@ IMM_CHANGES: Mapping[str, tuple[float, float, float]] = {
 
 #: The paper's scenario at level 3, the master's plan unknown; and with better dead reckoning.
 TURNING_LEVEL = LEVELS[2]
-PRECISE_SPEED_MPS, PRECISE_HEADING_RAD = 0.2, 0.03
+PRECISE_SPEED_M_S, PRECISE_HEADING_RAD = 0.2, 0.03
 
 
 def crossing_scenario(level: int, *, runs: int, seed: int) -> SlatScenario:
@@ -111,7 +111,7 @@ def turning_scenario(*, precise: bool, runs: int, seed: int) -> SlatScenario:
     paper = replace(paper_scenario(TURNING_LEVEL, runs=runs, seed=seed), plan_known=False)
     if not precise:
         return paper
-    return replace(paper, sigma_speed_m_s=PRECISE_SPEED_MPS, sigma_heading_rad=PRECISE_HEADING_RAD)
+    return replace(paper, sigma_speed_m_s=PRECISE_SPEED_M_S, sigma_heading_rad=PRECISE_HEADING_RAD)
 
 
 def imm(
