@@ -84,14 +84,14 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_a_page_is_its_template_filled(package: Path) -> None:
-    (package / "page.md").write_text("# {one.name}\n\n{two:.2f}\nm\n\n| a |\n| --- |\n{rows}\n")
+    (package / "page.md").write_text("# {one.name}\n\n{two:.2f}\nm\n\n| a |\n| --- |\n{rows}\n\n| b |\n")
     page = markdown.page(
         "made_up.page",
         one=types.SimpleNamespace(name="N"),
         two=1.234,
         rows=markdown.rows([("x|y",), (3,)]) + "\n",
     )
-    assert page == "# N\n\n1.23 m\n\n| a |\n| --- |\n| x\\|y |\n| 3 |\n"
+    assert page == "# N\n\n1.23 m\n\n| a |\n| --- |\n| x\\|y |\n| 3 |\n\n| b |\n"
     with pytest.raises(KeyError, match="one"):
         markdown.page("made_up.page", two=1.0, rows="")
 

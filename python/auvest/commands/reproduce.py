@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from importlib import import_module
-from inspect import Parameter, signature
+from inspect import Parameter, Signature, signature
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -111,18 +111,14 @@ def with_options(
 ) -> Callable[..., None]:
     """Give a function the signature from which typer makes these options and those of all."""
     known = signature(defaults).parameters
-    parameters = [
-        Parameter(name, Parameter.KEYWORD_ONLY, annotation=option, default=known[name].default)
-        for name, option in annotations.items()
-    ]
-    for name, option, default in (
-        ("output", options.Output, folder),
-        ("as_json", options.Json, False),
-        ("quiet", options.Quiet, False),
-    ):
-        parameters.append(
+    wanted = {name: (option, known[name].default) for name, option in annotations.items()}
+    wanted["output"] = (options.Output, folder)
+    wanted.update(as_json=(options.Json, False), quiet=(options.Quiet, False))
+    function.__annotations__ = {name: option for name, (option, _) in wanted.items()}
+    function.__signature__ = Signature(  # type: ignore[attr-defined]
+        [
             Parameter(name, Parameter.KEYWORD_ONLY, annotation=option, default=default)
-        )
-    function.__signature__ = signature(function).replace(parameters=parameters)  # type: ignore[attr-defined]
-    function.__annotations__ = {one.name: one.annotation for one in parameters}
+            for name, (option, default) in wanted.items()
+        ]
+    )
     return function

@@ -8,19 +8,9 @@ from collections.abc import Iterable
 from auvest import RangeBearing
 from auvest.reproduce import markdown
 from auvest.reproduce.intervals import measure
-from auvest.reproduce.intervals.measure import (
-    BUDGET_SIGMAS,
-    DURATION_S,
-    LEVEL,
-    NAMES,
-    POLICIES,
-    TRACKS,
-    Case,
-    Reproduction,
-)
 
 
-def page(result: Reproduction) -> str:
+def page(result: measure.Reproduction) -> str:
     """Return the Markdown page."""
     cases = result.cases
     won = [case for case in cases if case.dominates]
@@ -31,11 +21,11 @@ def page(result: Reproduction) -> str:
         __name__,
         result=result,
         measure=measure,
-        tracks="; ".join(f"{n} (from {_pair(t.position)} m)" for n, t in TRACKS.items()),
+        tracks="; ".join(f"{n} (from {_pair(t.position)} m)" for n, t in measure.TRACKS.items()),
         station=_pair(RangeBearing().station),
         near=_ranges("near"),
         far=_ranges("far"),
-        level=100 * LEVEL,
+        level=100 * measure.LEVEL,
         won=len(won),
         points=len(cases),
         calm_won=sum(case.dominates for case in calm),
@@ -49,19 +39,19 @@ def page(result: Reproduction) -> str:
     )
 
 
-def _table(cases: Iterable[Case]) -> str:
+def _table(cases: Iterable[measure.Case]) -> str:
     header = ["track", "noise", "budget / m", "T / s"]
-    header += [f"RMSE / m, {name}" for name in NAMES.values()]
-    header += [f"above / %, {name}" for name in NAMES.values()]
+    header += [f"RMSE / m, {name}" for name in measure.NAMES.values()]
+    header += [f"above / %, {name}" for name in measure.NAMES.values()]
     header += ["dominates"]
     rows = [
         [
             case.track,
             case.noise,
-            f"{BUDGET_SIGMAS * case.sigma_m:.2f}",
+            f"{measure.BUDGET_SIGMAS * case.sigma_m:.2f}",
             f"{case.policies['budget'].interval_s:.3f}",
-            *(f"{case.policies[name].rmse_m:.3f}" for name in POLICIES),
-            *(f"{100 * case.policies[name].above:.1f}" for name in POLICIES),
+            *(f"{case.policies[name].rmse_m:.3f}" for name in measure.POLICIES),
+            *(f"{100 * case.policies[name].above:.1f}" for name in measure.POLICIES),
             "yes" if case.dominates else f"no: {_why_not(case)}",
         ]
         for case in cases
@@ -81,14 +71,14 @@ def _pair(values: tuple[float, float]) -> str:
 def _ranges(prefix: str) -> str:
     """Give the shortest and the longest range of the tracks so called."""
     ranges = []
-    for name, track in TRACKS.items():
+    for name, track in measure.TRACKS.items():
         if name.startswith(prefix):
-            for second in range(round(DURATION_S) + 1):
+            for second in range(round(measure.DURATION_S) + 1):
                 ranges.append(RangeBearing().h([*track.position_at(second), 0, 0, 0, 0])[0])
     return f"{min(ranges):.0f} to {max(ranges):.0f}"
 
 
-def _worst_rate(cases: list[Case]) -> float:
+def _worst_rate(cases: list[measure.Case]) -> float:
     return max(
         100 * abs(f.interval_s / case.policies["budget"].interval_s - 1)
         for case in cases
@@ -96,9 +86,9 @@ def _worst_rate(cases: list[Case]) -> float:
     )
 
 
-def _why_not(case: Case) -> str:
+def _why_not(case: measure.Case) -> str:
     reasons = []
-    if case.rmse_ratio > 1 + LEVEL:
+    if case.rmse_ratio > 1 + measure.LEVEL:
         reasons.append(f"RMSE +{100 * (case.rmse_ratio - 1):.1f} %")
     for name in ("fixed", "law"):
         rival, own = case.policies[name], case.policies["budget"]

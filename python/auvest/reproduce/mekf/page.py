@@ -8,20 +8,11 @@ from auvest.reproduce import markdown
 from auvest.reproduce.markdown import number, rows, table
 from auvest.reproduce.mekf import measure
 from auvest.reproduce.mekf.claims import claims
-from auvest.reproduce.mekf.measure import (
-    CONTAMINATION,
-    KERNELS,
-    LABELS,
-    Displaced,
-    Judged,
-    Reproduction,
-    Score,
-)
 
-_KERNEL_NAMES = [LABELS[name] for name in KERNELS]
+_KERNEL_NAMES = [measure.LABELS[name] for name in measure.KERNELS]
 
 
-def page(result: Reproduction) -> str:
+def page(result: measure.Reproduction) -> str:
     """Return the page."""
     worlds = {**{f"timing {kind}": row for kind, row in result.timing.items()}, **result.worlds}
     return markdown.page(
@@ -32,7 +23,7 @@ def page(result: Reproduction) -> str:
         contamination=table(
             ("outliers", *_KERNEL_NAMES),
             [
-                (f"{100 * key[0]:g} % at {key[1]:g} m", *_cells(row, CONTAMINATION[key]))
+                (f"{100 * key[0]:g} % at {key[1]:g} m", *_cells(row, measure.CONTAMINATION[key]))
                 for key, row in result.contamination.items()
             ],
         ),
@@ -46,16 +37,16 @@ def page(result: Reproduction) -> str:
     )
 
 
-def _cells(row: Mapping[str, Score], reference: Mapping[str, float]) -> list[str]:
+def _cells(row: Mapping[str, measure.Score], reference: Mapping[str, float]) -> list[str]:
     return [
         row[name].rmse.text(2) + (f" ({reference[name]:.2f})" if name in reference else "")
-        for name in KERNELS
+        for name in measure.KERNELS
     ]
 
 
-def _consistency(j: Judged) -> tuple[str, ...]:
+def _consistency(j: measure.Judged) -> tuple[str, ...]:
     return (
-        LABELS[j.filter],
+        measure.LABELS[j.filter],
         f"{j.q_factor:g}",
         f"{j.r_factor:g}",
         f"{j.nees.mean:.2f}",
@@ -67,7 +58,7 @@ def _consistency(j: Judged) -> tuple[str, ...]:
     )
 
 
-def _displaced(d: Displaced, runs: int) -> tuple[str, ...]:
+def _displaced(d: measure.Displaced, runs: int) -> tuple[str, ...]:
     return (
         f"{d.back} of {runs}",
         "never" if d.slowest is None else f"{d.slowest}",

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from auvest.reproduce import markdown
 from auvest.reproduce.claims import assumption_rows, claim_rows, tally
 from auvest.reproduce.markdown import table
+from auvest.reproduce.slatf import measure
 from auvest.reproduce.slatf.claims import (
     TABLE1,
     apart,
@@ -17,26 +18,18 @@ from auvest.reproduce.slatf.claims import (
     span,
     where,
 )
-from auvest.reproduce.slatf.measure import (
-    BEST_LEVEL,
-    DEAF,
-    MANY,
-    Reproduction,
-    error_variance,
-    mean_error,
-)
 from auvest.scenarios.paper_slatf import ASSUMPTIONS, FILTERS, LEVELS, FilterName, Level
 
 _COMPARED: tuple[FilterName, ...] = ("slatf1", "slatf2", "ekf_slat")
 
 
-def page(result: Reproduction) -> str:
+def page(result: measure.Reproduction) -> str:
     """README.md: table, figures, claims, sensitivity and assumptions."""
     judged = claims(result)
     rows = [{name: at(result, level, name).value for name in FILTERS} for level in LEVELS]
-    dr, compensated = ([row[name] for row in rows] for name in DEAF)
+    dr, compensated = ([row[name] for row in rows] for name in measure.DEAF)
     two = [row["slatf2"] for row in rows]
-    many = next(one for one in result.variants if one.what == f"N = {MANY}")
+    many = next(one for one in result.variants if one.what == f"N = {measure.MANY}")
     return markdown.page(
         __name__,
         result=result,
@@ -47,8 +40,8 @@ def page(result: Reproduction) -> str:
         two_least=min(two),
         two_most=max(two),
         paper_best=paper_best(),
-        two_at_best=at(result, BEST_LEVEL, "slatf2").text(1),
-        ekf_at_best=at(result, BEST_LEVEL, "ekf_slat").text(1),
+        two_at_best=at(result, measure.BEST_LEVEL, "slatf2").text(1),
+        ekf_at_best=at(result, measure.BEST_LEVEL, "ekf_slat").text(1),
         compensated=span(compensated),
         one_beats=where([apart(result, level, "slatf1", "dr_compensated") for level in TABLE1]),
         joint_ratio=max(row["slatf_joint"] / row["ekf_slat"] for row in rows),
@@ -58,7 +51,7 @@ def page(result: Reproduction) -> str:
         claims=len(judged),
         tally=tally(judged),
         table1=table(("level", "noise", *FILTERS.values()), _table1(result)),
-        best_level=BEST_LEVEL.number,
+        best_level=measure.BEST_LEVEL.number,
         many=many,
         two_with_many=many.rmse["slatf2"].text(1),
         told="; ".join(_told(result)),
@@ -81,7 +74,7 @@ def page(result: Reproduction) -> str:
     )
 
 
-def _table1(result: Reproduction) -> Iterator[list[str]]:
+def _table1(result: measure.Reproduction) -> Iterator[list[str]]:
     for level in LEVELS:
         cells = [f"{level.number}", f"{level.sigma_range_m:g} m, {level.sigma_bearing_rad:g} rad"]
         for name in FILTERS:
@@ -91,13 +84,13 @@ def _table1(result: Reproduction) -> Iterator[list[str]]:
         yield cells
 
 
-def _told(result: Reproduction) -> Iterator[str]:
+def _told(result: measure.Reproduction) -> Iterator[str]:
     for one in result.variants:
         if "velocity told" in one.what:
             ekf, two = one.rmse["ekf_slat"].text(1), one.rmse["slatf2"].text(1)
             yield f"{one.what}: {ekf} m (EKF-SLAT), {two} m (2.0)"
 
 
-def _mean_and_variance(result: Reproduction, level: Level, name: FilterName) -> str:
+def _mean_and_variance(result: measure.Reproduction, level: Level, name: FilterName) -> str:
     one = result.levels[level.number][name]
-    return f"{mean_error(one):.1f}; {error_variance(one):.0f}"
+    return f"{measure.mean_error(one):.1f}; {measure.error_variance(one):.0f}"
