@@ -486,7 +486,7 @@ TEST_CASE_TEMPLATE("SLATF: unknown echoes of masters far apart do what known one
 
 TEST_CASE("SLATF 1.0: a particle whose correction overflows weighs nothing, the others as before") {
   using Filter = auvest::Slatf1<Compass<float>, Master<float>, 1>;
-  typename Filter::Params params;
+  Filter::Params params;
   params.resample_below = 0;
   const int particles = 5;
   const auvest::Sonar<float> sonar;
