@@ -563,7 +563,7 @@ TEST_CASE("EKF-SLAT with an Imm: the NIS is the mean over the hypotheses before 
     REQUIRE(both.update(&seen, 1, sonar, random) == Status::kOk);
     REQUIRE(straight.update(&seen, 1, sonar, random) == Status::kOk);
     REQUIRE(accelerated.update(&seen, 1, sonar, random) == Status::kOk);
-    CHECK(std::fabs(straight.nis() - accelerated.nis()) > 0.01);
+    if (k == 0) CHECK(std::fabs(straight.nis() - accelerated.nis()) > 0.05);
     CHECK(both.nis() == close_to((a * straight.nis() + b * accelerated.nis()) / (a + b), 1e-9));
   }
 }

@@ -502,15 +502,17 @@ TEST_CASE("SLATF 1.0: a particle whose correction overflows weighs nothing, the 
     REQUIRE(filter.reset(start, random) == Status::kOk);
     REQUIRE(filter.add_master(master_belief<float>(100, 150, 2, 1, 1)) == Status::kOk);
     if (overflows == 1) {
-      // Its velocity is at the end of the format, and the echo that moves the position moves it on.
+      // Its velocity is at the ends of the format, and the echo that moves x moves one part beyond.
       lost = static_cast<int>(std::max_element(weights[0].begin(), weights[0].end()) -
                               weights[0].begin());
       *filter.set().at(lost, Filter::kMasterField + 2) = std::numeric_limits<float>::max();
+      *filter.set().at(lost, Filter::kMasterField + 3) = std::numeric_limits<float>::lowest();
       *filter.set().at(lost, Filter::kMasterField + 6 + 3) = 1e36f;  // P(2, 0)
+      *filter.set().at(lost, Filter::kMasterField + 6 + 6) = 1e36f;  // P(3, 0)
     }
     Sighting<float> seen;
     seen.master = 0;
-    seen.z << 184, -2.16f;
+    seen.z << 181, -2.16f;
     REQUIRE(filter.update(&seen, 1, sonar, random) == Status::kOk);
     for (int i = 0; i < particles; ++i) {
       weights[overflows].push_back(auvest::weight_of(filter.set().log_weight(i)));
