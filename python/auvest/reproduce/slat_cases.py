@@ -36,7 +36,7 @@ from auvest.slat_models import Master
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-DEFAULT_RUNS = 60
+DEFAULT_RUNS = 40
 DEFAULT_SEED = 1
 
 #: Course and speed of all masters, and the turn, are its.
@@ -66,7 +66,7 @@ CROSSING_FILTERS: Mapping[str, str] = {
 #: What each single model is tried with; the best is compared: process noise of the paper's model of
 #: constant acceleration (m/s^2), and of constant velocity (m^2/s^3).
 ACCELERATIONS_M_S2 = (1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
-VELOCITY_PSDS = (1e-3, 1e-2, 1e-1, 1.0)
+VELOCITY_PSDS = (1e-2, 1e-1, 3e-1, 1.0, 3.0, 10.0)
 
 #: The IMM, the same for both: masters hold what they do (hardly any noise in any model) and change
 #: it once in 200 s; a manoeuvre begins with 0.1 m/s^2, 1 degree per second at 10 kn.
@@ -479,7 +479,8 @@ def _crossing_moral(results: Mapping[str, Any]) -> str:
         "Against SLATF 2.0, whose particles are cheaper, SlatfJoint is clearly better for the "
         f"slave with {slave} of {len(against)} sonars, for the masters with {masters}, and clearly "
         f"worse for the masters with {worse}. Any particles keep both answers; those of SlatfJoint "
-        "also keep the drift that slave and masters share, which shows in what they claim (covered)."
+        "also keep the drift that slave and masters share, which shows in what they claim "
+        "(covered)."
     )
 
 
