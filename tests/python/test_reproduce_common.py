@@ -84,7 +84,9 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_a_page_is_its_template_filled(package: Path) -> None:
-    (package / "page.md").write_text("# {one.name}\n\n{two:.2f}\nm\n\n| a |\n| --- |\n{rows}\n\n| b |\n")
+    (package / "page.md").write_text(
+        "# {one.name}\n\n{two:.2f}\nm\n\n| a |\n| --- |\n{rows}\n\n| b |\n"
+    )
     page = markdown.page(
         "made_up.page",
         one=types.SimpleNamespace(name="N"),
