@@ -3,8 +3,8 @@
 A filter runs under Python in any case. "chip" says that it is built for the vehicle, "parity" that
 tests show the same float32 bits on every target, "budget" that docs/budgets.md has what it costs.
 
-Examples:
-
+Examples
+--------
   auvest filters
 
   auvest filters --json

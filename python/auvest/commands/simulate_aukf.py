@@ -54,7 +54,7 @@ from auvest.scenarios.paper_aukf import (
     TrackName,
     observed_positions,
 )
-from auvest.scenarios.tracking import Scenario, TrackingResult, simulate
+from auvest.scenarios.tracking import Scenario, TrackingResult, sensor_of, simulate
 
 _INTERVAL = "Sampling interval"
 
@@ -201,13 +201,11 @@ def command(
     with terminal.writing(output):
         files = {
             "per_step": write_csv(output / "per_step.csv", per_step),
-            "one_run": write_csv(
-                output / "one_run.csv", one_run(result, filter_.sensors["RangeBearing"])
-            ),
+            "one_run": write_csv(output / "one_run.csv", one_run(result, sensor_of(filter_))),
         }
         if not no_figure:
             files["figure"] = _draw(
-                output / "figure.png", result, filter_.sensors["RangeBearing"], filter_name, policy
+                output / "figure.png", result, sensor_of(filter_), filter_name, policy
             )
     session.report(values, files, _table(values, settings), per_step=per_step)
     kept = f"{values['runs']} of {runs} runs are done and kept"

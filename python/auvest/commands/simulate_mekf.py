@@ -30,7 +30,7 @@ from auvest.commands.console import Terminal, table
 from auvest.commands.files import write_csv
 from auvest.commands.options import FILTER, MONTE_CARLO, WORLD, finite, fraction, option, positive
 from auvest.commands.session import Floats, Session, failure, mean_over_runs
-from auvest.kernels import KernelName
+from auvest.kernels import KernelName, as_kernel
 from auvest.scenarios import cooperative
 from auvest.scenarios.cooperative import NoiseKind, RangeNoise, Result, Scenario, Timing
 
@@ -135,7 +135,7 @@ def command(
         )
     settings = {
         "filter": kind,
-        "kernel": {"name": kernel, **asdict(robust.kernel)},
+        "kernel": {"name": kernel, **asdict(as_kernel(kernel))},
         "residual": residual,
         "rejections": rejections,
         "dtype": dtype,

@@ -31,7 +31,7 @@ from auvest.reproduce import markdown
 from auvest.scenarios.paper_slatf import LEVELS, PARTICLES, paper_scenario
 from auvest.scenarios.slat import SlatResult, SlatScenario, Vehicle, simulate
 from auvest.slat import SlatFilter
-from auvest.slat_models import Master
+from auvest.slat.models import Master
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -30,7 +30,7 @@ from auvest.scenarios.paper_aukf import (
     paper_noise,
     paper_track,
 )
-from auvest.scenarios.tracking import Noise, Scenario, TrackingResult, simulate
+from auvest.scenarios.tracking import Noise, Scenario, TrackingResult, sensor_of, simulate
 
 DEFAULT_RUNS = 200
 DEFAULT_SEED = 1
@@ -524,4 +524,4 @@ def _track_table(result: TrackingResult, run: int = 0) -> dict[str, Floats]:
 
 def paper_station() -> tuple[float, float]:
     """Position of the base station, m: Table 1."""
-    return paper_filter("ukf", noise=paper_noise()).sensors["RangeBearing"].station
+    return sensor_of(paper_filter("ukf", noise=paper_noise())).station
