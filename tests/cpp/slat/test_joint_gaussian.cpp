@@ -15,7 +15,7 @@ namespace {
 
 using auvest::Belief;
 using auvest::kUnknownMaster;
-using auvest::Sighting;
+using auvest::Echo;
 using auvest::Vector;
 using Compass = auvest::CompassMotion<double>;
 using Unicycle = auvest::UnicycleMotion<double>;
@@ -44,7 +44,7 @@ struct SideBySide {
   using Model = auvest::JointGaussian<Compass, Master, 3>;
   static constexpr int kStates = Model::kStates;
   Model::Joint joint;
-  Sighting<double> echoes[2];
+  Echo<double> echoes[2];
   const auvest::Sonar<double> sonar = precise();
 
   SideBySide() {

@@ -14,7 +14,7 @@ namespace {
 
 using namespace slat_test;
 using Pair = auvest::Vector<float, 2>;
-using auvest::Sighting;
+using auvest::Echo;
 using auvest::Status;
 using auvest::math::Random;
 
@@ -39,8 +39,8 @@ typename Filter::MasterBelief master_at(float x) {
   return master;
 }
 
-Sighting<float> echo_of(int master, float range, float bearing) {
-  Sighting<float> seen;
+Echo<float> echo_of(int master, float range, float bearing) {
+  Echo<float> seen;
   seen.master = master;
   seen.z << range, bearing;
   return seen;
@@ -54,7 +54,7 @@ void run(Filter& filter, Random& random, int pings) {
   REQUIRE(filter.add_master(master_at<Filter>(-200)) == Status::kOk);
   for (int k = 0; k < pings; ++k) {
     REQUIRE(filter.predict(1, Pair(2, 0.1f), random) == Status::kOk);
-    const Sighting<float> seen[2] = {echo_of(0, 180.0f + float(k), -2.16f),
+    const Echo<float> seen[2] = {echo_of(0, 180.0f + float(k), -2.16f),
                                      echo_of(1, 250.0f - float(k), -0.65f)};
     REQUIRE(filter.update(seen, 1 + k % 2, sonar, random) == Status::kOk);
   }
@@ -114,7 +114,7 @@ TEST_CASE_TEMPLATE("second run: what is refused leaves no trace", Filter, FloatS
   Gated<Filter> other;
   Random random[2] = {Random(8), Random(8)};
   Filter& filter = refused.filter;
-  Sighting<float> seen[2] = {echo_of(0, 180, -2.16f), echo_of(1, 250, -0.65f)};
+  Echo<float> seen[2] = {echo_of(0, 180, -2.16f), echo_of(1, 250, -0.65f)};
   CHECK(filter.add_master(master_at<Filter>(0)) == Status::kNotInitialised);
   CHECK(filter.predict(1, u, random[0]) == Status::kNotInitialised);
   CHECK(filter.update(seen, 1, sonar, random[0]) == Status::kNotInitialised);

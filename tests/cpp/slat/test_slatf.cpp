@@ -510,7 +510,7 @@ TEST_CASE("SLATF 1.0: a particle whose correction overflows weighs nothing, the 
       *filter.set().at(lost, Filter::kMasterField + 6 + 3) = 1e36f;  // P(2, 0)
       *filter.set().at(lost, Filter::kMasterField + 6 + 6) = 1e36f;  // P(3, 0)
     }
-    Sighting<float> seen;
+    Echo<float> seen;
     seen.master = 0;
     seen.z << 181, -2.16f;
     REQUIRE(filter.update(&seen, 1, sonar, random) == Status::kOk);
@@ -543,7 +543,7 @@ TEST_CASE("SLATF: a master is born where the echo comes from, as far as the slav
   device.bearing = auvest::Bearing::kFromHeading;
   device.sigma_range_m = 0.5;
   device.sigma_bearing_rad = 0.02;
-  Sighting<double> seen;
+  Echo<double> seen;
   seen.master = auvest::kUnknownMaster;
   seen.z << 100, 0.5;
   Belief<double, 3> start;
@@ -612,7 +612,7 @@ TEST_CASE_TEMPLATE("SLATF: a master is born from an echo that nobody expects, on
   REQUIRE(stepwise.filter.reset(start, by_step) == Status::kOk);
   REQUIRE(in_two.filter.reset(start, by_two) == Status::kOk);
   for (int k = 0; k < 4; ++k) {
-    Sighting<double> seen;
+    Echo<double> seen;
     seen.master = auvest::kUnknownMaster;
     seen.z << 100 + k, -2.4;
     const Vector<double, 2> u(1, 0.3);
