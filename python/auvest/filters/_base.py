@@ -106,7 +106,7 @@ class GaussianFilter:
         states = len(self._process.state)
         state = as_array("x0", x0, (states,), self._dtype)
         covariance = as_covariance("P0", P0, states, self._dtype)
-        start = np.resize(state, 2) if states == 1 else state[:2].copy()
+        start = state[[0, min(1, states - 1)]]
         if reference is not None:
             start = as_array("reference", reference, (2,), self._dtype)
         self._build()
