@@ -89,7 +89,7 @@ FILTERS: dict[str, Filter] = {
     for name, cls, title, family, where in (
         ("ekf", "Ekf", "EKF", "gaussian", {"replay": True, **_EVERYWHERE}),
         ("ukf", "Ukf", "UKF", "gaussian", {"replay": True, **_EVERYWHERE}),
-        ("ckf", "Ckf", "CKF", "gaussian", {"chip": True, "parity": True}),
+        ("ckf", "Ckf", "CKF", "gaussian", {"replay": True, "chip": True, "parity": True}),
         ("aukf", "Aukf", "AUKF", "gaussian", {"replay": True, **_EVERYWHERE}),
         ("robust-ekf", "RobustEkf", "robust EKF", "gaussian", {"replay": True, **_EVERYWHERE}),
         (
