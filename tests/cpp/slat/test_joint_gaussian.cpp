@@ -6,6 +6,7 @@
 
 #include <Eigen/LU>
 #include <cmath>
+#include <utility>
 
 #include "auvest/models/piecewise_acceleration.hpp"
 #include "auvest/models/slave_motion.hpp"

@@ -484,6 +484,12 @@ TEST_CASE_TEMPLATE("SLATF: unknown echoes of masters far apart do what known one
   CHECK(a.storage == b.storage);
 }
 
+/// The particles of a filter, to be put where a test wants them.
+template <class Filter>
+typename Filter::Set& particles_of(Filter& filter) {
+  return const_cast<typename Filter::Set&>(filter.set());
+}
+
 TEST_CASE("SLATF 1.0: a particle whose correction overflows weighs nothing, the others as before") {
   using Filter = auvest::Slatf1<Compass<float>, Master<float>, 1>;
   Filter::Params params;
@@ -505,17 +511,17 @@ TEST_CASE("SLATF 1.0: a particle whose correction overflows weighs nothing, the 
       // Its velocity is at the ends of the format, and the echo that moves x moves one part beyond.
       lost = static_cast<int>(std::max_element(weights[0].begin(), weights[0].end()) -
                               weights[0].begin());
-      *filter.set().at(lost, Filter::kMasterField + 2) = std::numeric_limits<float>::max();
-      *filter.set().at(lost, Filter::kMasterField + 3) = std::numeric_limits<float>::lowest();
-      *filter.set().at(lost, Filter::kMasterField + 6 + 3) = 1e36f;  // P(2, 0)
-      *filter.set().at(lost, Filter::kMasterField + 6 + 6) = 1e36f;  // P(3, 0)
+      *particles_of(filter).at(lost, Filter::kMasterField + 2) = std::numeric_limits<float>::max();
+      *particles_of(filter).at(lost, Filter::kMasterField + 3) = std::numeric_limits<float>::lowest();
+      *particles_of(filter).at(lost, Filter::kMasterField + 6 + 3) = 1e36f;  // P(2, 0)
+      *particles_of(filter).at(lost, Filter::kMasterField + 6 + 6) = 1e36f;  // P(3, 0)
     }
     Echo<float> seen;
     seen.master = 0;
     seen.z << 181, -2.16f;
     REQUIRE(filter.update(&seen, 1, sonar, random) == Status::kOk);
     for (int i = 0; i < particles; ++i) {
-      weights[overflows].push_back(auvest::weight_of(filter.set().log_weight(i)));
+      weights[overflows].push_back(auvest::weight_of(filter.set().log_weights()[i]));
     }
     CHECK(std::isfinite(filter.log_likelihood()));
     if (overflows == 1) {  // and keeps what it believed

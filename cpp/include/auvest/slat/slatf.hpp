@@ -271,6 +271,9 @@ class Slatf : public SlatfFrame<SlatfParticle<Motion_, Master_, Proposal_, Maste
   /// Section 6, steps 1 to 3, with the echoes: [SLATF 58] for 2.0, then one echo after the other.
   AUVEST_INLINE void correct(const Tile& tile, const Update& update) {
     Value chosen[Schedule::kGroups][Masters];
+    for (auto& group : chosen) {
+      for (Value& master : group) master = Value(0);  // compilers cannot see that it is set in time
+    }
     if (!update.all_known()) {
       tile.run(typename Particle::AssociateAndPropose{set_, update, masters_, chosen});
     } else if (Proposal::kInformed) {
