@@ -100,10 +100,12 @@ def test_a_measurement_holds_what_the_page_and_the_figures_need(quick, tmp_path)
         assert (tmp_path / name).stat().st_size > 10_000
 
 
-def test_only_echoes_without_a_name_can_swap_masters(quick):
+def test_who_is_told_whose_echo_it_is_swaps_no_masters(quick):
     for row in quick.results["crossing"]:
         assert row["filters"]["told"]["swapped"] == 0
-    assert quick.curves["crossing_swapped_told"].max() == 0
+    # While they meet, at 100 s, nearness says nothing.
+    far = np.abs(quick.curves["crossing_time_s"] - 100) > 50
+    assert quick.curves["crossing_swapped_told"][far].max() == 0
 
 
 def test_of_each_single_model_the_best_noise_is_compared(committed):

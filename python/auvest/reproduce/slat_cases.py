@@ -379,11 +379,16 @@ In short:
 - **A master that turns**, and nobody has said so: {_turning_in_short(results)}
 
 """
-    return markdown.fill(text) + "\n\n" + _crossing_page(results) + "\n" + _turning_page(results)
+    parts = (markdown.fill(text).rstrip() + "\n", _crossing_page(results), _turning_page(results))
+    return "\n".join(parts)
 
 
 def _pm(value: Mapping[str, float], decimals: int = 1) -> str:
     return f"{value['mean']:.{decimals}f} ± {value['standard_error']:.{decimals}f}"
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %"
 
 
 def _crossing_in_short(results: Mapping[str, Any]) -> str:
@@ -391,9 +396,9 @@ def _crossing_in_short(results: Mapping[str, Any]) -> str:
     first = (won or results["crossing"])[0]
     ekf, joint = (first["filters"][name] for name in ("ekf_slat", "slatf_joint"))
     numbers = (
-        f"EKF-SLAT ends with the two masters swapped in {ekf['swapped']:.0%} of the runs, SLATF "
-        f"joint in {joint['swapped']:.0%}; RMSE of the masters {_pm(ekf['master_rmse_m'])} m and "
-        f"{_pm(joint['master_rmse_m'])} m."
+        f"EKF-SLAT ends with the two masters swapped in {_percent(ekf['swapped'])} of the runs, "
+        f"SlatfJoint in {_percent(joint['swapped'])}; RMSE of the masters "
+        f"{_pm(ekf['master_rmse_m'])} m and {_pm(joint['master_rmse_m'])} m."
     )
     if not won:
         return f"no case for SlatfJoint was found here. {numbers}"
@@ -407,14 +412,15 @@ def _turning_in_short(results: Mapping[str, Any]) -> str:
         for case in results["turning"]
     ]
     numbers = "; ".join(
-        " and ".join(
+        f"with odometry of {case['sigma_speed_mps']:g} m/s and {case['sigma_heading_rad']:g} rad "
+        + ", ".join(
             f"{_pm(row['relative_rmse_m'], 2)} m ({row['model']})"
-            for row in case["models"]
+            for row in reversed(case["models"])
             if row["compared"]
         )
         for case in results["turning"]
     )
-    numbers = f"RMSE of the master's position relative to the slave's: {numbers}."
+    numbers = f"RMSE of the master's position relative to the slave's, {numbers}."
     if not all(verdicts):
         return f"the IMM is clearly better in {sum(verdicts)} of {len(verdicts)} cases. {numbers}"
     return f"the IMM is clearly better than either model alone with its best noise. {numbers}"
@@ -443,9 +449,9 @@ other master. Covered: share of the pings at which the slave lies in its 95 % el
                     [
                         CROSSING_FILTERS[name],
                         _pm(numbers["master_rmse_m"]),
-                        f"{numbers['swapped']:.0%}",
+                        _percent(numbers["swapped"]),
                         _pm(numbers["slave_rmse_m"]),
-                        f"{numbers['covered']:.0%}",
+                        _percent(numbers["covered"]),
                     ]
                     for name, numbers in row["filters"].items()
                 ],
@@ -512,7 +518,7 @@ what keeps the two together.
                         row["noise"],
                         _pm(row["relative_rmse_m"], 2),
                         _pm(row["slave_rmse_m"], 2),
-                        f"{row['covered']:.0%}",
+                        _percent(row["covered"]),
                     ]
                     for row in case["models"]
                 ],
@@ -581,24 +587,28 @@ def _crossing_figure(cases: Cases) -> Figure:
         f"Two masters that cross, {sonar['sigma_range_m']:g} m and "
         f"{sonar['sigma_bearing_rad']:g} rad",
     )
-    plane, share = figure.subplots(1, 2)
+    one_run, share = figure.subplots(1, 2)
+    time_s = curves["crossing_time_s"]
+    course = PAPER_MASTER.heading_rad
+    abeam = np.array([-math.sin(course), math.cos(course)])
+    middle = curves["crossing_masters"].mean(axis=1)
     for master, style in enumerate(("-", "--")):
-        x, y = curves["crossing_masters"][:, master].T
-        plane.plot(x, y, style, color=plots.BLACK, label=f"master {master}, truth")
+        truth = (curves["crossing_masters"][:, master] - middle) @ abeam
+        one_run.plot(time_s, truth, style, color=plots.BLACK, label=f"master {master}, truth")
         for name in ("ekf_slat", "slatf_joint"):
-            x, y = curves[f"crossing_{name}"][:, master].T
+            across = (curves[f"crossing_{name}"][:, master] - middle) @ abeam
             label = f"master {master}, {CROSSING_FILTERS[name]}"
-            plane.plot(x, y, style, color=colours[name], linewidth=1.1, label=label)
-    plane.set(xlabel="x / m", ylabel="y / m")
-    plane.set_aspect("equal", adjustable="datalim")
-    plane.legend(fontsize=7)
+            one_run.plot(time_s, across, style, color=colours[name], linewidth=1.1, label=label)
+    one_run.axvline(MEET_S, color=plots.BLACK, linewidth=0.6)
+    one_run.set(xlabel="time / s", ylabel="one run: place across the course / m")
+    one_run.legend(fontsize=7)
     for name, title in CROSSING_FILTERS.items():
         percent = 100 * curves[f"crossing_swapped_{name}"]
-        share.plot(curves["crossing_time_s"], percent, color=colours[name], label=title)
+        share.plot(time_s, percent, color=colours[name], label=title)
     share.axvline(MEET_S, color=plots.BLACK, linewidth=0.6)
     share.set(xlabel="time / s", ylabel="runs with the masters swapped / %", ylim=(0, 100))
     share.legend(fontsize=7)
-    for axes in (plane, share):
+    for axes in (one_run, share):
         plots.style(axes)
     return figure
 
