@@ -24,6 +24,13 @@ AUVEST_NAMES_OF(kMeasureNames)
 
 #undef AUVEST_NAMES_OF
 
+/// Whether a sensor of `least` leading states can be for n of them; asked per Scalar, so that what
+/// does not suit is not compiled.
+template <class Scalar>
+constexpr bool suits(int n, int least) {
+  return n >= least;
+}
+
 /// Whether the Python module brings the filters of n states in this precision.
 template <class Scalar>
 constexpr bool has_filters(int n) {
