@@ -76,7 +76,7 @@ def find_models(text: str, path: Path) -> list[Found]:
             "    template <class Scalar>\n"
             "    struct Drift : auvest::ProcessModel<Drift<Scalar>, Scalar, 2> { ... };\n"
             "    template <class Scalar, int N>\n"
-            "    struct Range : auvest::MeasurementModel<Range<Scalar, N>, Scalar, N, 1, 2> { ... };"
+            "    struct Range : auvest::MeasurementModel<Range<Scalar, N>, Scalar, N, 1> { ... };"
         )
     names = [model.name for model in found]
     for model in found:
@@ -217,8 +217,8 @@ def find_compiler() -> tuple[list[str], str]:
             return command, f"{shlex.join(command)} {done.stdout}"
     missing = f"CXX names {named!r}, which is not there" if named else "there is none in PATH"
     raise ModelError(
-        f"load_models needs a C++ compiler, and {missing}: install g++ (Debian, Ubuntu: apt install "
-        "g++; Fedora: dnf install gcc-c++) or clang++, or set CXX"
+        f"load_models needs a C++ compiler, and {missing}: install g++ (Debian, Ubuntu: apt "
+        "install g++; Fedora: dnf install gcc-c++) or clang++, or set CXX"
     )
 
 

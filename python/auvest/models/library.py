@@ -167,7 +167,9 @@ class _LoadedSensor(_Loaded, MeasurementModel):
 
     def _how_to_name(self, process: ProcessModel) -> str:
         unnamed = self if not self._named else process
-        names = " ".join((process.state if not self._named else self.observes)[: len(self.observes)])
+        names = " ".join(
+            (process.state if not self._named else self.observes)[: len(self.observes)]
+        )
         return (
             f"; name the states in the struct {type(unnamed).__name__}: "
             f'static constexpr const char* kStateNames = "{names}";'
