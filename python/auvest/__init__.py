@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from auvest._core import SelfTestResult as SelfTestResult
     from auvest._core import Status as Status
     from auvest._core import self_test as self_test
+    from auvest._headers import get_include as get_include
     from auvest.errors import FilterError as FilterError
+    from auvest.errors import ModelError as ModelError
     from auvest.filters import Aukf as Aukf
     from auvest.filters import Ekf as Ekf
     from auvest.filters import Report as Report
@@ -51,6 +53,7 @@ if TYPE_CHECKING:
     from auvest.models import RangeBearingElevation as RangeBearingElevation
     from auvest.models import SpeedHeading as SpeedHeading
     from auvest.models import WhiteAcceleration as WhiteAcceleration
+    from auvest.models.library import load_models as load_models
     from auvest.slat import UNKNOWN_MASTER as UNKNOWN_MASTER
     from auvest.slat import DeadReckoning as DeadReckoning
     from auvest.slat import EkfSlat as EkfSlat
@@ -96,6 +99,7 @@ else:
         "LeaderRange": "models",
         "MahalanobisInterval": "intervals",
         "MeasurementModel": "models",
+        "ModelError": "errors",
         "Odometry": "models",
         "Outage": "slat",
         "PiecewiseAcceleration": "slat.models",
@@ -121,6 +125,8 @@ else:
         "UnicycleMotion": "slat.models",
         "Unit": "kernels",
         "WhiteAcceleration": "models",
+        "get_include": "_headers",
+        "load_models": "models.library",
         "self_test": "_core",
     }
     __all__ = sorted([*_HOME, *_SUBMODULES])

@@ -63,6 +63,8 @@ class GaussianFilter:
 
     #: How the core linearises: its number in ``AnyLinearisation``.
     _linearisation: ClassVar[int]
+    #: Whether it asks models for their Jacobians.
+    _jacobians: ClassVar[bool] = False
 
     def __init__(
         self,
@@ -84,7 +86,10 @@ class GaussianFilter:
     ) -> None:
         self._dtype = as_dtype(dtype)
         self._process: ProcessModel = as_instance("process", process, ProcessModel)
+        self._require_jacobian(self._process)
         self._sensors = _as_sensors(sensors, self._process)
+        for model in self._sensors.values():
+            self._require_jacobian(model)
         self._kernel = None if kernel is None else as_kernel(kernel)
         if recovery is not None:
             as_instance("recovery", recovery, RejectionStreak)
@@ -617,7 +622,14 @@ class GaussianFilter:
             raise TypeError(f"sensor must be {what}")
         model: MeasurementModel = as_instance("sensor", sensor, MeasurementModel)
         model.check_process(self._process)
+        self._require_jacobian(model)
         return model.core(len(self._process.state), self._dtype)
+
+    def _require_jacobian(self, model: ProcessModel | MeasurementModel) -> None:
+        if model.lacks and self._jacobians:
+            raise ValueError(
+                f"{type(model).__name__} has no {model.lacks}: an Ekf needs it; use Ukf or Ckf"
+            )
 
     def _as_sensor_rows(
         self, sensor: str | MeasurementModel | Sequence[str] | None
