@@ -64,6 +64,10 @@ COMMANDS: Mapping[tuple[str, ...], tuple[str, str]] = {
         "reproduce.logs.command",
         "Replay the validation recordings and set the errors beside the targets.",
     ),
+    ("reproduce", "slat-cases"): (
+        "reproduce.slat_cases.command",
+        "Cases in which SlatfJoint and the IMM earn their place, and by how much.",
+    ),
     ("reproduce", "mrclam6"): (
         "reproduce.mrclam6.command",
         "Track real robots that see each other, with one setting for all tracks.",

@@ -84,7 +84,8 @@ def test_load_models_from_an_installed_wheel(wheel, root, tmp_path, run):
     code = (
         "import auvest\n"
         "models = auvest.load_models('my_models.hpp')\n"
-        "ukf = auvest.Ukf([1, 2, 0, 0, 0, 0], [[float(i == j) for i in range(6)] for j in range(6)],"
+        "eye = [[float(i == j) for i in range(6)] for j in range(6)]\n"
+        "ukf = auvest.Ukf([1, 2, 0, 0, 0, 0], eye,"
         " process=models.MyAcceleration(), sensors=models.MyRangeBearing(), dtype='float32')\n"
         "ukf.predict(0.1)\n"
         "ukf.update([3, 0.5])\n"

@@ -9,7 +9,10 @@ import numpy as np
 import pytest
 from conftest import ROOT
 
-from auvest.reproduce import slat_cases
+from auvest import plots
+from auvest.reproduce.slat_cases import measure as slat_cases
+from auvest.reproduce.slat_cases.figures import FIGURES
+from auvest.reproduce.slat_cases.page import page, page_of
 from auvest.scenarios.slat import SlatResult, simulate
 
 PAGE = ROOT / "docs" / "reproduction" / "slat_cases"
@@ -91,13 +94,11 @@ def test_the_imm_has_the_three_models_and_one_straight_model_alone():
 
 
 def test_a_measurement_holds_what_the_page_and_the_figures_need(quick, tmp_path):
-    files = slat_cases.write(tmp_path, quick, header={"command": "reproduce slat-cases"})
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(files)
-    document = json.loads((tmp_path / "results.json").read_text())
-    assert document["command"] == "reproduce slat-cases"
-    assert (tmp_path / "README.md").read_text() == slat_cases.page(document)
-    for name in ("crossing.png", "turning.png"):
-        assert (tmp_path / name).stat().st_size > 10_000
+    document = json.loads(json.dumps(slat_cases.summary(quick)))
+    assert page_of(document) == page(quick)
+    for name, draw in FIGURES.items():
+        path = plots.save(draw(quick), tmp_path / f"{name}.png")
+        assert path.stat().st_size > 10_000
 
 
 def test_who_is_told_whose_echo_it_is_swaps_no_masters(quick):
@@ -137,7 +138,7 @@ def test_differences_are_those_of_the_means(committed):
 
 def test_the_committed_page_is_that_of_the_committed_results(committed):
     assert committed["runs"] == slat_cases.DEFAULT_RUNS
-    assert slat_cases.page(committed) == (PAGE / "README.md").read_text()
+    assert page_of(committed) == (PAGE / "README.md").read_text()
     filters = [f for row in committed["crossing"] for f in row["filters"].values()]
     rows = [row for case in committed["turning"] for row in case["models"]]
     assert not any(one["failed_runs"] for one in (*filters, *rows))

@@ -53,7 +53,7 @@ def command(
         ``measure.measure``, which has their defaults.
     """
     package = page.__name__.rpartition(".")[0]
-    name = package.rpartition(".")[2]
+    name = package.rpartition(".")[2].replace("_", "-")
 
     def run(*, output: Path, as_json: bool, quiet: bool, **given: Any) -> None:
         terminal = Terminal(as_json=as_json, quiet=quiet)
