@@ -22,7 +22,7 @@ DEV_PACKAGES := $(PACKAGES) $(FIRMWARE_PACKAGES) \
 
 CXX_FILES = $(shell find cpp firmware tests -name '*.hpp' -o -name '*.cpp' -o -name '*.h')
 # What the Python module is compiled from.
-CORE_FILES := pyproject.toml CMakeLists.txt $(shell find cpp/include cpp/bindings cpp/cmake -type f)
+CORE_FILES := pyproject.toml CMakeLists.txt $(shell find cpp/include cpp/desk cpp/bindings cpp/cmake cpp/licences -type f)
 
 .PHONY: help
 help: ## list the commands

@@ -65,8 +65,8 @@ std::vector<float> read_numbers(const char* path) {
 
 Motion make_motion() {
   Motion::Params p;
-  p.sigma_speed_mps = 0.1f;
-  p.sigma_yaw_rate_radps = 0.005f;
+  p.sigma_speed_m_s = 0.1f;
+  p.sigma_yaw_rate_rad_s = 0.005f;
   return Motion(p);
 }
 
@@ -110,7 +110,7 @@ void run(Filter& filter, int particles, std::uint64_t seed, const Row* record, f
   auvest::math::Random random(seed);
   start(filter, particles, random);
   for (int k = 0; k < kSteps; ++k) {
-    auvest::Sighting<float> seen;
+    auvest::Echo<float> seen;
     seen.z = record[k].echo;
     seen.master = 0;
     if (filter.step(kSeconds, record[k].reading, nullptr, &seen, 1, sonar, random) !=

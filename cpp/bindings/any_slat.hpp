@@ -3,12 +3,14 @@
 #pragma once
 
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "auvest/slat/dead_reckoning.hpp"
+#include "auvest/slat/echo.hpp"
 #include "auvest/slat/ekf_slat.hpp"
 #include "auvest/slat/imm_slat.hpp"
-#include "auvest/slat/sighting.hpp"
+#include "slat_state.hpp"
 
 namespace auvest {
 
@@ -33,7 +35,7 @@ class AnySlat {
   using SlaveBelief = Belief<Scalar, Pose>;
   using MasterBelief = Belief<Scalar, 6>;
   using VelocityChange = Vector<Scalar, 2>;
-  using Echo = Sighting<Scalar>;
+  using Echo = auvest::Echo<Scalar>;
 
   struct Interface {
     virtual ~Interface() = default;
@@ -42,11 +44,11 @@ class AnySlat {
     virtual Status add_master(const MasterBelief& belief) = 0;
     virtual Status predict(Scalar dt, const Control& u, math::Random& random,
                            const VelocityChange* changes) = 0;
-    virtual Status update(const Echo* sightings, int count, const Sonar<Scalar>& sonar,
+    virtual Status update(const Echo* echoes, int count, const Sonar<Scalar>& sonar,
                           math::Random& random) = 0;
     /// predict() and update(), both or, where one is refused, neither.
     virtual Status step(Scalar dt, const Control& u, const VelocityChange* changes,
-                        const Echo* sightings, int count, const Sonar<Scalar>& sonar,
+                        const Echo* echoes, int count, const Sonar<Scalar>& sonar,
                         math::Random& random) = 0;
     virtual SlaveBelief slave() const = 0;
     virtual MasterBelief master(int n) const = 0;
@@ -55,11 +57,15 @@ class AnySlat {
     virtual std::vector<Scalar> mode_probabilities(int n) const = 0;
     /// Weights (particles) and poses (particles x Pose); nothing where there are no particles.
     virtual void particles(Scalar* weights, Scalar* poses) const = 0;
+    virtual SlatState<Scalar> state() const = 0;
+    /// False where it is not the state of such a filter. Then this one must not be used any more.
+    virtual bool restore(const SlatState<Scalar>& state) = 0;
   };
 
   explicit AnySlat(std::unique_ptr<Interface> filter) : filter_(std::move(filter)) {}
   AnySlat(const AnySlat& other) : filter_(other.filter_->clone()) {}
   AnySlat(AnySlat&&) = default;
+  AnySlat& operator=(AnySlat&&) = default;
 
   Status reset(const SlaveBelief& pose, math::Random& random) {
     return filter_->reset(pose, random);
@@ -69,19 +75,27 @@ class AnySlat {
                  const VelocityChange* changes = nullptr) {
     return filter_->predict(dt, u, random, changes);
   }
-  Status update(const Echo* sightings, int count, const Sonar<Scalar>& sonar,
+  Status update(const Echo* echoes, int count, const Sonar<Scalar>& sonar,
                 math::Random& random) {
-    return filter_->update(sightings, count, sonar, random);
+    return filter_->update(echoes, count, sonar, random);
   }
-  Status step(Scalar dt, const Control& u, const VelocityChange* changes, const Echo* sightings,
+  Status step(Scalar dt, const Control& u, const VelocityChange* changes, const Echo* echoes,
               int count, const Sonar<Scalar>& sonar, math::Random& random) {
-    return filter_->step(dt, u, changes, sightings, count, sonar, random);
+    return filter_->step(dt, u, changes, echoes, count, sonar, random);
   }
   SlaveBelief slave() const { return filter_->slave(); }
   MasterBelief master(int n) const { return filter_->master(n); }
   SlatReadings<Scalar> readings() const { return filter_->readings(); }
   std::vector<Scalar> mode_probabilities(int n) const { return filter_->mode_probabilities(n); }
   void particles(Scalar* weights, Scalar* poses) const { filter_->particles(weights, poses); }
+  SlatState<Scalar> state() const { return filter_->state(); }
+  /// False, with the filter as it was, where it is not the state of such a filter.
+  bool restore(const SlatState<Scalar>& state) {
+    std::unique_ptr<Interface> twin = filter_->clone();
+    if (!twin->restore(state)) return false;
+    filter_ = std::move(twin);
+    return true;
+  }
 
  private:
   std::unique_ptr<Interface> filter_;
@@ -121,14 +135,25 @@ class SlatModel : public AnySlat<typename Filter::Scalar, Filter::kPose>::Interf
                  const typename Any::VelocityChange* changes) override {
     return filter_.predict(dt, u, random, changes);
   }
-  Status update(const typename Any::Echo* sightings, int count, const Sonar<Scalar>& sonar,
+  Status update(const typename Any::Echo* echoes, int count, const Sonar<Scalar>& sonar,
                 math::Random& random) override {
-    return filter_.update(sightings, count, sonar, random);
+    return filter_.update(echoes, count, sonar, random);
   }
   typename Any::SlaveBelief slave() const override { return filter_.slave(); }
+  SlatState<Scalar> state() const override {
+    StateKeeper<Scalar> keeper;
+    Filter::visit_state(filter_, keeper);
+    return keeper.state;
+  }
+  bool restore(const SlatState<Scalar>& state) override {
+    StateReturner<Scalar> returner(state);
+    Filter::visit_state(filter_, returner);
+    return returner.complete();
+  }
 
  protected:
-  explicit SlatModel(const Filter& filter) : filter_(filter) {}
+  template <class... Arguments>
+  explicit SlatModel(Arguments&&... arguments) : filter_(std::forward<Arguments>(arguments)...) {}
 
   Filter filter_;
 };
@@ -145,18 +170,18 @@ class SlatfModel : private std::vector<typename Filter::Scalar>, public SlatMode
   template <class Setup>
   explicit SlatfModel(const Setup& setup)
       : Storage(Filter::Set::storage_size(setup.particles)),
-        Base(Filter(setup.motion, setup.master, setup.params, Storage::data(), setup.particles,
-                    setup.resampling)) {}
+        Base(setup.motion, setup.master, setup.params, Storage::data(), setup.particles,
+             setup.resampling) {}
   SlatfModel(const SlatfModel& other)
-      : Storage(other), Base(Filter(other.filter_, Storage::data())) {}
+      : Storage(other.size()), Base(other.filter_, Storage::data()) {}
 
   std::unique_ptr<typename Any::Interface> clone() const override {
     return std::unique_ptr<typename Any::Interface>(new SlatfModel(*this));
   }
   Status step(Scalar dt, const typename Any::Control& u,
-              const typename Any::VelocityChange* changes, const typename Any::Echo* sightings,
+              const typename Any::VelocityChange* changes, const typename Any::Echo* echoes,
               int count, const Sonar<Scalar>& sonar, math::Random& random) override {
-    return this->filter_.step(dt, u, changes, sightings, count, sonar, random);
+    return this->filter_.step(dt, u, changes, echoes, count, sonar, random);
   }
   typename Any::MasterBelief master(int n) const override { return this->filter_.master(n); }
   std::vector<Scalar> mode_probabilities(int n) const override {
@@ -194,16 +219,17 @@ class GaussianSlatModel : public SlatModel<Filter> {
   using typename Base::Scalar;
 
   explicit GaussianSlatModel(const Filter& filter) : Base(filter) {}
+  GaussianSlatModel(const GaussianSlatModel& other) : Base(other.filter_) {}
 
   std::unique_ptr<typename Any::Interface> clone() const override {
     return std::unique_ptr<typename Any::Interface>(new GaussianSlatModel(*this));
   }
   Status step(Scalar dt, const typename Any::Control& u,
-              const typename Any::VelocityChange* changes, const typename Any::Echo* sightings,
+              const typename Any::VelocityChange* changes, const typename Any::Echo* echoes,
               int count, const Sonar<Scalar>& sonar, math::Random& random) override {
     const Filter before = this->filter_;
     Status status = this->filter_.predict(dt, u, random, changes);
-    if (status == Status::kOk) status = this->filter_.update(sightings, count, sonar, random);
+    if (status == Status::kOk) status = this->filter_.update(echoes, count, sonar, random);
     if (status != Status::kOk) this->filter_ = before;
     return status;
   }

@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "auvest/math/random.hpp"
 #include "binders.hpp"
 
@@ -36,6 +38,20 @@ void bind_random(py::module_& m) {
   py::class_<math::Random> c(m, "Random", "xoshiro128++: the same stream on every target.");
   c.def(py::init<std::uint64_t, std::uint64_t>(), py::arg("seed"), py::arg("stream") = 0);
   c.def("copy", [](const math::Random& random) { return random; });
+  c.def("save", [](const math::Random& random) {
+    std::uint32_t state[math::Random::kStateWords];
+    random.get_state(state);
+    return py::array_t<std::uint32_t>(math::Random::kStateWords, state);
+  });
+  c.def(
+      "restore",
+      [](math::Random& random, const Array<std::uint32_t>& words) {
+        require_shape(words, {math::Random::kStateWords}, "words");
+        std::uint32_t state[math::Random::kStateWords];
+        std::copy_n(words.data(), math::Random::kStateWords, state);
+        random.set_state(state);
+      },
+      py::arg("words").noconvert());
   c.def("next_u32", &math::Random::next_u32, "32 random bits.");
   bind_precision<float>(c);
   bind_precision<double>(c);

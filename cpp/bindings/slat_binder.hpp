@@ -11,6 +11,7 @@
 #include "any_slat.hpp"
 #include "auvest/slat/outage.hpp"
 #include "binders.hpp"
+#include "plain.hpp"
 #include "simulation/slat.hpp"
 #include "slat_params.hpp"
 #include "slatf_setup.hpp"
@@ -31,7 +32,7 @@ class SlatBinder {
   using Any = AnySlat<Scalar, kPose>;
   using Switch = Outage<Any, Any::kMasters>;
   using Master = PiecewiseAcceleration<Scalar>;
-  using Echo = Sighting<Scalar>;
+  using Echo = auvest::Echo<Scalar>;
   using Change = typename Any::VelocityChange;
   using Device = Sonar<Scalar>;
   using Integers = Array<std::int64_t>;
@@ -66,6 +67,13 @@ class SlatBinder {
             },
             py::arg("motion"))
         .def("copy", [](const Any& f) { return Any(f); })
+        .def("save", [](const Any& f) { return to_arrays(f.state()); })
+        .def(
+            "restore",
+            [](Any& f, const Array<Scalar>& numbers, const Integers& counts) {
+              if (!f.restore(to_state(numbers, counts))) refuse_state();
+            },
+            py::arg("numbers").noconvert(), py::arg("counts").noconvert())
         .def(
             "reset",
             [](Any& f, const Array<Scalar>& x, const Array<Scalar>& p, math::Random& random) {
@@ -78,22 +86,36 @@ class SlatBinder {
               require_ok(f.add_master(belief<6>(x, p)));
             },
             py::arg("x").noconvert(), py::arg("P").noconvert())
-        .def("step", &step, py::arg("dt"), py::arg("u").noconvert(), py::arg("changes").noconvert(),
-             py::arg("z").noconvert(), py::arg("master").noconvert(), py::arg("sonar"),
-             py::arg("random"))
+        .def("step", &step, py::arg("dt"), py::arg("u"), py::arg("changes"), py::arg("z"),
+             py::arg("master"), py::arg("unknown"), py::arg("sonar"), py::arg("random"))
         .def("particles", &particles)
         .def("mode_probabilities", &Any::mode_probabilities, py::arg("n"))
         .def("simulate", &simulate, py::arg("sonar"), py::arg("scenario"), py::arg("seed"),
-             py::arg("first_run"), py::arg("runs"))
-        .def_property_readonly("readings", &readings);
+             py::arg("first_run"), py::arg("runs"));
     bind_steps(filter);
 
     py::class_<Switch> outage(m, named<Scalar>("SlatOutage_" + motion).c_str());
     outage.def(py::init([](const Any& f) { return Switch(f); }), py::arg("prototype"))
         .def("copy", [](const Switch& f) { return Switch(f); })
+        .def("save",
+             [](const Switch& f) {
+               StateKeeper<Scalar> keeper;
+               Switch::visit_state(f, keeper);
+               return to_arrays(keeper.state);
+             })
+        .def(
+            "restore",
+            [](Switch& f, const Array<Scalar>& numbers, const Integers& counts) {
+              const SlatState<Scalar> state = to_state(numbers, counts);
+              StateReturner<Scalar> returner(state);
+              Switch twin(f);
+              Switch::visit_state(twin, returner);
+              if (!returner.complete()) refuse_state();
+              f = std::move(twin);
+            },
+            py::arg("numbers").noconvert(), py::arg("counts").noconvert())
         .def("share", &share, py::arg("x").noconvert(), py::arg("P").noconvert(),
              py::arg("masters_x").noconvert(), py::arg("masters_P").noconvert())
-        .def_property_readonly("filter", [](const Switch& f) { return Any(f.filter()); })
         .def_property_readonly("communication", [](const Switch& f) {
           const Communication mode = f.mode();
           return mode == Communication::kUp     ? "up"
@@ -106,23 +128,35 @@ class SlatBinder {
  private:
   template <class Filter>
   static void bind_steps(py::class_<Filter>& c) {
+    // False where an argument is not plain: then nothing was done.
     c.def(
          "predict",
-         [](Filter& f, Scalar dt, const Array<Scalar>& u, const Array<Scalar>& changes,
-            math::Random& random) {
-           const Plan plan(changes);
-           require_ok(f.predict(dt, to_matrix<2, 1>(u, "u"), random, plan.pointer()));
+         [](Filter& f, py::handle dt, py::handle u, py::handle changes, math::Random& random) {
+           Move move;
+           if (!move.take(dt, u, changes, masters_of(f))) return false;
+           require_ok(f.predict(move.dt, move.u, random, move.changes()));
+           return true;
          },
-         py::arg("dt"), py::arg("u").noconvert(), py::arg("changes").noconvert(), py::arg("random"))
+         py::arg("dt"), py::arg("u"), py::arg("changes"), py::arg("random"))
         .def(
             "update",
-            [](Filter& f, const Array<Scalar>& z, const Integers& master, const Device& sonar,
+            [](Filter& f, py::handle z, py::handle master, bool unknown, const Device& sonar,
                math::Random& random) {
-              const Echoes echoes(z, master);
+              Echoes echoes;
+              if (!echoes.take(z, master, masters_of(f), unknown)) return false;
               require_ok(f.update(echoes.heard, echoes.count, sonar, random));
+              return true;
             },
-            py::arg("z").noconvert(), py::arg("master").noconvert(), py::arg("sonar"),
+            py::arg("z"), py::arg("master"), py::arg("unknown"), py::arg("sonar"),
             py::arg("random"))
+        .def_property_readonly("masters", [](const Filter& f) { return masters_of(f); })
+        .def_property_readonly("resamplings",
+                               [](const Filter& f) { return readings_of(f).resamplings; })
+        .def_property_readonly("effective_size",
+                               [](const Filter& f) { return readings_of(f).effective_size; })
+        .def_property_readonly("log_likelihood",
+                               [](const Filter& f) { return readings_of(f).log_likelihood; })
+        .def_property_readonly("nis", [](const Filter& f) { return readings_of(f).nis; })
         .def("run", &run<Filter>, py::arg("time_s").noconvert(), py::arg("u").noconvert(),
              py::arg("changes").noconvert(), py::arg("echo_time_s").noconvert(),
              py::arg("z").noconvert(), py::arg("master").noconvert(), py::arg("sonar"),
@@ -139,6 +173,28 @@ class SlatBinder {
               return py::make_tuple(to_array(b.x), to_array(b.P));
             },
             py::arg("n"));
+  }
+
+  static py::dict to_arrays(const SlatState<Scalar>& state) {
+    py::dict result;
+    result["numbers"] =
+        py::array_t<Scalar>(static_cast<py::ssize_t>(state.numbers.size()), state.numbers.data());
+    result["counts"] = py::array_t<std::int64_t>(static_cast<py::ssize_t>(state.counts.size()),
+                                                 state.counts.data());
+    return result;
+  }
+
+  static SlatState<Scalar> to_state(const Array<Scalar>& numbers, const Integers& counts) {
+    require_shape(numbers, {-1}, "numbers");
+    require_shape(counts, {-1}, "counts");
+    SlatState<Scalar> state;
+    state.numbers.assign(numbers.data(), numbers.data() + numbers.size());
+    state.counts.assign(counts.data(), counts.data() + counts.size());
+    return state;
+  }
+
+  [[noreturn]] static void refuse_state() {
+    throw py::value_error("numbers and counts are not the state of such a filter");
   }
 
   template <class Model>
@@ -161,38 +217,100 @@ class SlatBinder {
     return result;
   }
 
-  /// Velocity changes (masters, 2) with room for masters that are born; no rows: no plan.
-  struct Plan {
-    Change changes[Any::kMasters];
-    bool given;
+  /// What a prediction is told.
+  struct Move {
+    Scalar dt;
+    typename Any::Control u;
 
-    explicit Plan(const Array<Scalar>& array) : given(array.ndim() > 0 && array.shape(0) > 0) {
-      require_shape(array, {-1, 2}, "changes");
-      if (array.shape(0) > Any::kMasters) throw py::value_error("changes has too many masters");
-      for (int n = 0; n < Any::kMasters; ++n) {
-        const bool planned = n < array.shape(0);
-        for (int i = 0; i < 2; ++i) changes[n](i) = planned ? array.data()[2 * n + i] : Scalar(0);
+    /// False where something is not plain. `planned` is None or (masters, 2), at least one row.
+    bool take(py::handle seconds, py::handle reading, py::handle planned, int masters) {
+      if (!plain::take(seconds, dt) || dt < Scalar(0) || !plain::take(reading, u)) return false;
+      if (planned.is_none()) return true;
+      if (!plain::is_array(planned) || !py::isinstance<Array<Scalar>>(planned)) return false;
+      const auto array = py::reinterpret_borrow<Array<Scalar>>(planned);
+      const int rows = std::max(1, masters);
+      if (array.ndim() != 2 || array.shape(0) != rows || array.shape(1) != 2) return false;
+      // Masters that are born have none.
+      for (Change& change : plan_) math::set_zero(change);
+      for (int n = 0; n < rows; ++n) {
+        for (int i = 0; i < 2; ++i) plan_[n](i) = array.data()[2 * n + i];
+        if (!math::all_finite(plan_[n])) return false;
       }
+      planned_ = true;
+      return true;
     }
-    const Change* pointer() const { return given ? changes : nullptr; }
+    const Change* changes() const { return planned_ ? plan_ : nullptr; }
+
+   private:
+    Change plan_[Any::kMasters];
+    bool planned_ = false;
   };
 
-  /// Echoes (count, 2) and the masters they belong to (count).
+  /// What the sonar heard at one time.
   struct Echoes {
     Echo heard[Any::kMasters];
-    int count;
+    int count = 0;
 
-    Echoes(const Array<Scalar>& z, const Integers& master) : count(0) {
-      require_shape(z, {-1, 2}, "z");
-      require_shape(master, {z.shape(0)}, "master");
-      if (z.shape(0) > Any::kMasters) throw py::value_error("z has too many echoes");
-      for (; count < z.shape(0); ++count)
-        fill(heard[count], z.data() + 2 * count, master.data()[count]);
+    /// False where something is not plain, or not right. `z` is None, (2,) or (K, 2); rows of NaN
+    /// are missing. `master` is None, an int or (K,); None: nobody knows, if `unknown`, or the only
+    /// one.
+    bool take(py::handle z, py::handle master, int masters, bool unknown) {
+      if (z.is_none()) return true;
+      double numbers[2 * Any::kMasters];
+      py::ssize_t rows = 1;
+      if (plain::is_array(z) && py::reinterpret_borrow<py::array>(z).ndim() == 2) {
+        const auto array = py::reinterpret_borrow<py::array>(z);
+        rows = array.shape(0);
+        if (rows < 1 || rows > Any::kMasters || array.shape(1) != 2) return false;
+        if (!plain::take_elements<double>(z, 2 * rows, numbers) &&
+            !plain::take_elements<float>(z, 2 * rows, numbers)) {
+          return false;
+        }
+      } else if (!plain::take_any(z, 2, numbers)) {
+        return false;
+      }
+      std::int64_t who[Any::kMasters];
+      if (!take_masters(master, rows, masters, unknown, who)) return false;
+      for (py::ssize_t row = 0; row < rows; ++row) {
+        const double* one = numbers + 2 * row;
+        if (std::isnan(one[0]) && std::isnan(one[1])) continue;
+        Echo& echo = heard[count++];
+        echo.master = static_cast<int>(who[row]);
+        for (int i = 0; i < 2; ++i) {
+          if (!(std::fabs(one[i]) <= 1e9) || !plain::narrow(one[i], echo.z(i))) return false;
+        }
+        for (int earlier = 0; earlier + 1 < count; ++earlier) {
+          if (echo.master != kUnknownMaster && heard[earlier].master == echo.master) return false;
+        }
+      }
+      return true;
     }
     static void fill(Echo& echo, const Scalar* z, std::int64_t master) {
       echo.z(0) = z[0];
       echo.z(1) = z[1];
       echo.master = static_cast<int>(master);
+    }
+
+   private:
+    static bool take_masters(py::handle master, py::ssize_t rows, int masters, bool unknown,
+                             std::int64_t* who) {
+      if (master.is_none()) {
+        std::fill_n(who, rows, unknown ? kUnknownMaster : 0);
+        return unknown || masters <= 1;
+      }
+      if (plain::is_array(master) && py::isinstance<Integers>(master)) {
+        const auto array = py::reinterpret_borrow<Integers>(master);
+        if (array.ndim() != 1 || array.shape(0) != rows) return false;
+        std::copy_n(array.data(), rows, who);
+      } else {
+        double number;
+        if (!PyLong_CheckExact(master.ptr()) || !plain::take_any(master, number)) return false;
+        if (!(std::fabs(number) < 1e9)) return false;
+        std::fill_n(who, rows, static_cast<std::int64_t>(number));
+      }
+      return std::all_of(who, who + rows, [masters](std::int64_t n) {
+        return n == kUnknownMaster || (n >= 0 && n < masters);
+      });
     }
   };
 
@@ -296,13 +414,17 @@ class SlatBinder {
     require_ok(outage.share(belief<kPose>(x, p), masters, static_cast<int>(count)));
   }
 
-  static void step(Any& filter, Scalar dt, const Array<Scalar>& u, const Array<Scalar>& changes,
-                   const Array<Scalar>& z, const Integers& master, const Device& sonar,
-                   math::Random& random) {
-    const Plan plan(changes);
-    const Echoes echoes(z, master);
-    require_ok(filter.step(dt, to_matrix<2, 1>(u, "u"), plan.pointer(), echoes.heard, echoes.count,
-                           sonar, random));
+  static bool step(Any& filter, py::handle dt, py::handle u, py::handle changes, py::handle z,
+                   py::handle master, bool unknown, const Device& sonar, math::Random& random) {
+    Move move;
+    Echoes echoes;
+    const int masters = masters_of(filter);
+    if (!move.take(dt, u, changes, masters) || !echoes.take(z, master, masters, unknown)) {
+      return false;
+    }
+    require_ok(
+        filter.step(move.dt, move.u, move.changes(), echoes.heard, echoes.count, sonar, random));
+    return true;
   }
 
   static py::tuple particles(const Any& filter) {
@@ -313,16 +435,10 @@ class SlatBinder {
     return py::make_tuple(weights, poses);
   }
 
-  static py::dict readings(const Any& filter) {
-    const SlatReadings<Scalar> now = filter.readings();
-    py::dict result;
-    result["masters"] = now.masters;
-    result["particles"] = now.particles;
-    result["resamplings"] = now.resamplings;
-    result["effective_size"] = now.effective_size;
-    result["log_likelihood"] = now.log_likelihood;
-    result["nis"] = now.nis;
-    return result;
+  static int masters_of(const Any& filter) { return filter.readings().masters; }
+  static int masters_of(const Switch& outage) {
+    return outage.mode() == Communication::kDown ? outage.filter().readings().masters
+                                                 : outage.shared_masters();
   }
 
   static SlatReadings<Scalar> readings_of(const Any& filter) { return filter.readings(); }

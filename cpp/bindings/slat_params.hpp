@@ -25,16 +25,16 @@ namespace auvest {
     __VA_ARGS__                                    \
   }
 
-AUVEST_VISIT(CompassMotion, v("sigma_speed_mps", p.sigma_speed_mps);
+AUVEST_VISIT(CompassMotion, v("sigma_speed_m_s", p.sigma_speed_m_s);
              v("sigma_heading_rad", p.sigma_heading_rad); v("compensate_bias", p.compensate_bias);)
-AUVEST_VISIT(UnicycleMotion, v("sigma_speed_mps", p.sigma_speed_mps);
-             v("sigma_yaw_rate_radps", p.sigma_yaw_rate_radps);)
-AUVEST_VISIT(PiecewiseAcceleration, v("acceleration_mps2", p.acceleration_mps2);)
+AUVEST_VISIT(UnicycleMotion, v("sigma_speed_m_s", p.sigma_speed_m_s);
+             v("sigma_yaw_rate_rad_s", p.sigma_yaw_rate_rad_s);)
+AUVEST_VISIT(PiecewiseAcceleration, v("acceleration_m_s2", p.acceleration_m_s2);)
 AUVEST_VISIT(ConstantVelocity, v("velocity_psd", p.velocity);
-             v("sigma_acceleration_mps2", p.sigma_acceleration_mps2);)
+             v("sigma_acceleration_m_s2", p.sigma_acceleration_m_s2);)
 AUVEST_VISIT(CoordinatedTurn, v("position_psd", p.noise.position);
              v("velocity_psd", p.noise.velocity); v("acceleration_psd", p.noise.acceleration);
-             v("slow_mps", p.slow_mps);)
+             v("slow_m_s", p.slow_m_s);)
 AUVEST_VISIT(Sonar, v("sigma_range_m", p.sigma_range_m);
              v("sigma_bearing_rad", p.sigma_bearing_rad);)
 
@@ -55,8 +55,8 @@ void visit(SlatfParams<Scalar>& p, Visitor v) {
   v("resample_below", p.resample_below);
   v("carry_covariance", p.carry_covariance);
   v("gate", p.gate);
-  v("birth_velocity_mps", p.birth_velocity_mps);
-  v("birth_acceleration_mps2", p.birth_acceleration_mps2);
+  v("birth_velocity_m_s", p.birth_velocity_m_s);
+  v("birth_acceleration_m_s2", p.birth_acceleration_m_s2);
 }
 
 template <class Scalar, class Visitor>
@@ -71,9 +71,9 @@ void visit(SlatVehicle& p, Visitor v) {
   v("x_m", p.position[0]);
   v("y_m", p.position[1]);
   v("heading_rad", p.heading);
-  v("speed_mps", p.speed);
+  v("speed_m_s", p.speed);
   v("turn_start_s", p.turn_start_s);
-  v("turn_rate_radps", p.turn_rate);
+  v("turn_rate_rad_s", p.turn_rate);
 }
 
 template <class Visitor>
@@ -81,7 +81,7 @@ void visit(SlatScenario& p, Visitor v) {
   v("duration_s", p.duration_s);
   v("odometry_s", p.odometry_s);
   v("odometry_per_ping", p.odometry_per_ping);
-  v("sigma_speed_mps", p.sigma_speed_mps);
+  v("sigma_speed_m_s", p.sigma_speed_m_s);
   v("sigma_heading_rad", p.sigma_heading_rad);
   v("sigma_range_m", p.sigma_range_m);
   v("sigma_bearing_rad", p.sigma_bearing_rad);
@@ -93,8 +93,8 @@ void visit(SlatScenario& p, Visitor v) {
   v("identified", p.identified);
   v("plan_known", p.plan_known);
   v("prior_position_m", p.prior_position_m);
-  v("prior_velocity_mps", p.prior_velocity_mps);
-  v("prior_acceleration_mps2", p.prior_acceleration_mps2);
+  v("prior_velocity_m_s", p.prior_velocity_m_s);
+  v("prior_acceleration_m_s2", p.prior_acceleration_m_s2);
 }
 
 }  // namespace auvest

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -54,25 +55,37 @@ Params params_from(const Scalar* values) {
   return params;
 }
 
+/// A model with these parameters: from its constructor, or with its member `params`.
+template <class Model>
+Model model_from(const ParamsOf<Model>& params) {
+  if constexpr (std::is_constructible<Model, const ParamsOf<Model>&>::value) {
+    return Model(params);
+  } else {
+    Model model;
+    if constexpr (!std::is_same<ParamsOf<Model>, NoParams>::value) model.params = params;
+    return model;
+  }
+}
+
 template <class Process, class Scalar>
-void add_process(Catalogue<Scalar>& catalogue, const char* name) {
-  using Params = typename Process::Params;
+void add_process(Catalogue<Scalar>& catalogue, const std::string& name) {
+  using Params = ParamsOf<Process>;
   auto& entry = catalogue.processes[name];
   entry.parameters = parameters_of<Params>();
   entry.make = [](const Scalar* values) -> std::shared_ptr<const AnyProcess<Scalar>> {
-    const Process process(params_from<Params>(values));
+    const Process process = model_from<Process>(params_from<Params>(values));
     if (process.check() != Status::kOk) return nullptr;
     return std::make_shared<const ProcessOf<Process>>(process);
   };
 }
 
 template <class Model, class Scalar>
-void add_sensor(Catalogue<Scalar>& catalogue, const char* name) {
-  using Params = typename Model::Params;
+void add_sensor(Catalogue<Scalar>& catalogue, const std::string& name) {
+  using Params = ParamsOf<Model>;
   auto& entry = catalogue.sensors[{name, Model::kStates}];
   entry.parameters = parameters_of<Params>();
   entry.make = [](const Scalar* values) -> std::shared_ptr<AnySensor<Scalar>> {
-    const Model model(params_from<Params>(values));
+    const Model model = model_from<Model>(params_from<Params>(values));
     if (model.check() != Status::kOk) return nullptr;
     return std::make_shared<SensorOf<Model>>(model);
   };

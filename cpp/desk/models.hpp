@@ -6,13 +6,17 @@
 // SensorFor know it; ProcessOf and SensorOf wrap a model of the core or of a user.
 #pragma once
 
+#include <algorithm>
+#include <limits>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "auvest/filters/robust.hpp"
 #include "auvest/runtime/any_kernel.hpp"
 #include "auvest/runtime/any_linearisation.hpp"
 #include "auvest/runtime/any_recovery.hpp"
+#include "desk/members.hpp"
 #include "desk/report.hpp"
 
 namespace auvest {
@@ -99,6 +103,8 @@ class RuntimeGaussian
     return how_.linearise(model, point, root, z, innovation, a, noise);
   }
 
+  const AnyLinearisation<Scalar>& linearisation() const { return how_; }
+
  private:
   AnyLinearisation<Scalar> how_;
 };
@@ -139,23 +145,14 @@ struct PlacedSensor {
   Scalar place[kMaxPlace] = {};
 };
 
-/// Size of a process's input, 0 if it has none.
-template <class Process>
-constexpr auto input_size(int) -> decltype(Process::Input::RowsAtCompileTime, 0) {
-  return Process::Input::RowsAtCompileTime;
-}
-template <class Process>
-constexpr int input_size(long) {
-  return 0;
-}
-
+/// A process without Jacobian is for points only: an EKF's prediction is refused.
 template <class Process>
 class ProcessOf final : public ProcessFor<typename Process::Scalar, Process::kStates> {
  public:
   using Scalar = typename Process::Scalar;
   static constexpr int kStates = Process::kStates;
-  static constexpr int kInputs = input_size<Process>(0);
-  static_assert(kInputs <= kMaxInputs, "a process is driven by at most 8 numbers");
+  static constexpr int kInputs = input_size<Process>();
+  static_assert(CheckProcess<Process>::kComplete, "");
   using Base = ProcessFor<Scalar, kStates>;
   using typename Base::Input;
 
@@ -167,18 +164,41 @@ class ProcessOf final : public ProcessFor<typename Process::Scalar, Process::kSt
 
   Status predict(const AnyLinearisation<Scalar>& how, Belief<Scalar, kStates>& belief, Scalar dt,
                  const Input& input) const override {
-    return how.predict(driven(input, Inputs<kInputs>()), belief, dt);
+    const Process& driven_process = driven(input, Inputs<kInputs>());
+    if constexpr (propagates<Process>()) {
+      return how.predict(driven_process, belief, dt);
+    } else {
+      if (how.kind == AnyLinearisation<Scalar>::Kind::kUkf) {
+        return predict_by_points(how.unscented, driven_process, belief, dt, IsLinear<false>());
+      }
+      if (how.kind == AnyLinearisation<Scalar>::Kind::kCkf) {
+        return predict_by_points(how.cubature, driven_process, belief, dt, IsLinear<false>());
+      }
+      return Status::kBadParameter;
+    }
   }
   Scalar position_variance(const Belief<Scalar, kStates>& belief, Scalar dt,
                            const Input& input) const override {
-    return driven(input, Inputs<kInputs>()).position_variance(belief, dt);
+    const Process& driven_process = driven(input, Inputs<kInputs>());
+    if constexpr (propagates<Process>()) {
+      return driven_process.position_variance(belief, dt);
+    } else {
+      Belief<Scalar, kStates> later = belief;
+      const CubaturePoints<Scalar> points(kStates);
+      predict_by_points(points, driven_process, later, dt, IsLinear<false>());
+      return kStates > 1 ? later.P(0, 0) + later.P(kStates > 1, kStates > 1) : later.P(0, 0);
+    }
   }
 
   void f(const Scalar* x, Scalar dt, const Scalar* input, Scalar* out) const override {
     copy(driven(to_input(input), Inputs<kInputs>()).f(to_state(x), dt), out);
   }
   void Phi(const Scalar* x, Scalar dt, const Scalar* input, Scalar* out) const override {
-    copy(driven(to_input(input), Inputs<kInputs>()).Phi(to_state(x), dt), out);
+    if constexpr (has_Phi<Process>()) {
+      copy(driven(to_input(input), Inputs<kInputs>()).Phi(to_state(x), dt), out);
+    } else {
+      std::fill_n(out, kStates * kStates, std::numeric_limits<Scalar>::quiet_NaN());
+    }
   }
   void Q(Scalar dt, const Scalar* input, Scalar* out) const override {
     copy(driven(to_input(input), Inputs<kInputs>()).Q(dt), out);
@@ -214,14 +234,28 @@ class ProcessOf final : public ProcessFor<typename Process::Scalar, Process::kSt
   Process process_;
 };
 
+/// A model without Jacobian as filters can take it that never ask for one.
+template <class Model>
+struct WithoutJacobian : Model {
+  struct Point : decltype(std::declval<const Model&>().about(typename Model::State())) {
+    typename Model::Jacobian H() const {
+      return Model::Jacobian::Constant(std::numeric_limits<typename Model::Scalar>::quiet_NaN());
+    }
+  };
+
+  explicit WithoutJacobian(const Model& model) : Model(model) {}
+
+  Point about(const typename Model::State& x) const { return Point{Model::about(x)}; }
+};
+
+/// A model without Jacobian is for points only: an EKF's update is refused.
 template <class Model>
 class SensorOf final : public SensorFor<typename Model::Scalar, Model::kStates> {
  public:
   using Scalar = typename Model::Scalar;
   static constexpr int kStates = Model::kStates;
   static constexpr int kSize = Model::kSize;
-  static_assert(kSize <= kMaxSize, "a measurement has at most 6 numbers");
-  static_assert(Model::kPlace <= kMaxPlace, "a place has at most 3 coordinates");
+  static_assert(CheckSensor<Model>::kComplete, "");
   using Base = SensorFor<Scalar, kStates>;
 
   explicit SensorOf(const Model& model) : Base(kStates, kSize, Model::kPlace), model_(model) {}
@@ -232,10 +266,10 @@ class SensorOf final : public SensorFor<typename Model::Scalar, Model::kStates> 
                         const PlacedSensor<Scalar, kStates>& placed) const override {
     typename Model::Measurement value;
     for (int i = 0; i < kSize; ++i) value(i) = z(i);
-    if (!placed.moved) return Report<Scalar>(filter.update(value, model_));
+    if (!placed.moved) return update(filter, value, model_);
     Model there = model_;
     there.place(placed.place);
-    return Report<Scalar>(filter.update(value, there));
+    return update(filter, value, there);
   }
 
   void measure(const Scalar* x, Scalar* z, std::size_t rows) const override {
@@ -248,6 +282,18 @@ class SensorOf final : public SensorFor<typename Model::Scalar, Model::kStates> 
   }
 
  private:
+  static Report<Scalar> update(RuntimeRobust<Scalar, kStates>& filter,
+                               const typename Model::Measurement& z, const Model& model) {
+    if constexpr (has_H<Model>()) {
+      return Report<Scalar>(filter.update(z, model));
+    } else {
+      if (filter.linearisation().kind == AnyLinearisation<Scalar>::Kind::kEkf) {
+        return Report<Scalar>(Status::kBadParameter);
+      }
+      return Report<Scalar>(filter.update(z, WithoutJacobian<Model>(model)));
+    }
+  }
+
   Model model_;
 };
 

@@ -11,7 +11,7 @@
 #include "auvest/math/angle.hpp"
 #include "auvest/math/random.hpp"
 #include "auvest/math/trigonometry.hpp"
-#include "auvest/slat/sighting.hpp"
+#include "auvest/slat/echo.hpp"
 #include "auvest/status.hpp"
 #include "auvest/types.hpp"
 
@@ -62,7 +62,7 @@ struct SlatScenario {
   SlatVehicle slave;
   SlatVehicle masters[kMasters];
   int count = 1;
-  double sigma_speed_mps = 2;      ///< of the slave's readings, section 7
+  double sigma_speed_m_s = 2;      ///< of the slave's readings, section 7
   double sigma_heading_rad = 0.3;  ///< section 7
   double sigma_range_m = 1;        ///< section 7, level 3
   double sigma_bearing_rad = 0.06;
@@ -74,8 +74,8 @@ struct SlatScenario {
   bool identified = true;       ///< the filter is told whose echo it hears
   bool plan_known = true;       ///< the filter knows the masters' velocity changes, u of [SLATF 4]
   double prior_position_m = 1;  ///< standard deviations of what was shared of the masters; R1
-  double prior_velocity_mps = 0.05;
-  double prior_acceleration_mps2 = 1e-4;
+  double prior_velocity_m_s = 0.05;
+  double prior_acceleration_m_s2 = 1e-4;
 
   SlatScenario() {
     slave.heading = math::pi<double>() / 6;
@@ -120,8 +120,8 @@ inline Status run_slat(Filter& filter, const Sonar<typename Filter::Scalar>& son
     typename Filter::MasterBelief prior;
     math::set_zero(prior.x);
     math::set_zero(prior.P);
-    const double sigmas[3] = {scenario.prior_position_m, scenario.prior_velocity_mps,
-                              scenario.prior_acceleration_mps2};
+    const double sigmas[3] = {scenario.prior_position_m, scenario.prior_velocity_m_s,
+                              scenario.prior_acceleration_m_s2};
     double e[4];
     world.normal_pair(e[0], e[1]);
     world.normal_pair(e[2], e[3]);
@@ -144,7 +144,7 @@ inline Status run_slat(Filter& filter, const Sonar<typename Filter::Scalar>& son
     double e[2];
     world.normal_pair(e[0], e[1]);
     typename Filter::Control reading;
-    reading(0) = static_cast<Scalar>(slave.speed + scenario.sigma_speed_mps * e[0]);
+    reading(0) = static_cast<Scalar>(slave.speed + scenario.sigma_speed_m_s * e[0]);
     reading(1) = static_cast<Scalar>(slave.heading + scenario.sigma_heading_rad * e[1]);
     slave.advance(before_s, dt);
     typename Filter::VelocityChange changes[SlatScenario::kMasters];
@@ -161,7 +161,7 @@ inline Status run_slat(Filter& filter, const Sonar<typename Filter::Scalar>& son
     if (k % scenario.odometry_per_ping != 0) continue;
 
     const double time = dt * k;
-    Sighting<Scalar> heard[SlatScenario::kMasters];
+    Echo<Scalar> heard[SlatScenario::kMasters];
     int count = 0;
     for (int n = 0; n < scenario.count; ++n) {
       double noise[2];

@@ -89,10 +89,10 @@ class Record:
     particles: int
     world: World = field(default_factory=paper_world)
     seed: int = 1
-    sigma_speed_mps: float = 2.0
+    sigma_speed_m_s: float = 2.0
     sigma_heading_rad: float = 0.3
     compensate_bias: bool = True
-    acceleration_mps2: float = 1e-4
+    acceleration_m_s2: float = 1e-4
     resample_below: float = 0.5
     gate: float = 0.0
     sigma_range_m: float = 1.0
@@ -104,9 +104,9 @@ class Record:
         readings = self.world.readings
         parts = [
             np.array([kind, self.particles, len(readings), self.seed], "<u4"),
-            np.array([self.sigma_speed_mps, self.sigma_heading_rad], "<f4"),
+            np.array([self.sigma_speed_m_s, self.sigma_heading_rad], "<f4"),
             np.array([self.compensate_bias], "<u4"),
-            np.array([self.acceleration_mps2, self.resample_below, self.gate], "<f4"),
+            np.array([self.acceleration_m_s2, self.resample_below, self.gate], "<f4"),
             np.array([self.sigma_range_m, self.sigma_bearing_rad], "<f4"),
             self.world.slave,
             self.world.master,

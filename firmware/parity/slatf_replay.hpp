@@ -42,10 +42,10 @@ class Replay {
     particles_ = static_cast<int>(stream_.read());
     readings_ = stream_.read();
     random_ = math::Random(stream_.read());
-    motion_.params.sigma_speed_mps = read();
+    motion_.params.sigma_speed_m_s = read();
     motion_.params.sigma_heading_rad = read();
     motion_.params.compensate_bias = stream_.read() != 0;
-    master_.params.acceleration_mps2 = read();
+    master_.params.acceleration_m_s2 = read();
     params_.resample_below = read();
     params_.gate = read();
     sonar_.params.sigma_range_m = read();
@@ -90,7 +90,7 @@ class Replay {
     const float dt = read();
     typename Filter::Control u;
     typename Filter::VelocityChange change;
-    Sighting<float> echo;
+    Echo<float> echo;
     read(u);
     read(change);
     const bool heard = stream_.read() != 0;

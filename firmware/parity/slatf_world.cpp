@@ -33,14 +33,14 @@ class Recorder {
     return auvest::Status::kOk;
   }
 
-  auvest::Status update(const auvest::Sighting<float>* heard, int count,
-                        const auvest::Sonar<float>&, auvest::math::Random&) {
+  auvest::Status update(const auvest::Echo<float>* heard, int count, const auvest::Sonar<float>&,
+                        auvest::math::Random&) {
     finish(count > 0 ? heard : nullptr);
     return auvest::Status::kOk;
   }
 
  private:
-  void finish(const auvest::Sighting<float>* heard) {
+  void finish(const auvest::Echo<float>* heard) {
     auvest::Vector<float, 2> z;
     auvest::math::set_zero(z);
     put(heard != nullptr ? 1 : 0);

@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from auvest._core import SelfTestResult as SelfTestResult
     from auvest._core import Status as Status
     from auvest._core import self_test as self_test
+    from auvest._headers import get_include as get_include
     from auvest.errors import FilterError as FilterError
+    from auvest.errors import ModelError as ModelError
     from auvest.filters import Aukf as Aukf
     from auvest.filters import Ekf as Ekf
     from auvest.filters import Report as Report
@@ -51,6 +53,7 @@ if TYPE_CHECKING:
     from auvest.models import RangeBearingElevation as RangeBearingElevation
     from auvest.models import SpeedHeading as SpeedHeading
     from auvest.models import WhiteAcceleration as WhiteAcceleration
+    from auvest.models.library import load_models as load_models
     from auvest.slat import UNKNOWN_MASTER as UNKNOWN_MASTER
     from auvest.slat import DeadReckoning as DeadReckoning
     from auvest.slat import EkfSlat as EkfSlat
@@ -58,13 +61,13 @@ if TYPE_CHECKING:
     from auvest.slat import Slatf as Slatf
     from auvest.slat import SlatfJoint as SlatfJoint
     from auvest.slat import SlatRun as SlatRun
-    from auvest.slat_models import CompassMotion as CompassMotion
-    from auvest.slat_models import ConstantVelocity as ConstantVelocity
-    from auvest.slat_models import CoordinatedTurn as CoordinatedTurn
-    from auvest.slat_models import Imm as Imm
-    from auvest.slat_models import PiecewiseAcceleration as PiecewiseAcceleration
-    from auvest.slat_models import Sonar as Sonar
-    from auvest.slat_models import UnicycleMotion as UnicycleMotion
+    from auvest.slat.models import CompassMotion as CompassMotion
+    from auvest.slat.models import ConstantVelocity as ConstantVelocity
+    from auvest.slat.models import CoordinatedTurn as CoordinatedTurn
+    from auvest.slat.models import Imm as Imm
+    from auvest.slat.models import PiecewiseAcceleration as PiecewiseAcceleration
+    from auvest.slat.models import Sonar as Sonar
+    from auvest.slat.models import UnicycleMotion as UnicycleMotion
 
     __version__: str
 else:
@@ -75,10 +78,10 @@ else:
         "Aukf": "filters",
         "BodyVelocity": "models",
         "Ckf": "filters.ckf",
-        "CompassMotion": "slat_models",
+        "CompassMotion": "slat.models",
         "ConstantAcceleration": "models",
-        "ConstantVelocity": "slat_models",
-        "CoordinatedTurn": "slat_models",
+        "ConstantVelocity": "slat.models",
+        "CoordinatedTurn": "slat.models",
         "CovarianceBudget": "intervals",
         "DeadReckoning": "slat",
         "Decision": "_core",
@@ -92,13 +95,14 @@ else:
         "Hampel": "kernels",
         "Huber": "kernels",
         "Igg": "kernels",
-        "Imm": "slat_models",
+        "Imm": "slat.models",
         "LeaderRange": "models",
         "MahalanobisInterval": "intervals",
         "MeasurementModel": "models",
+        "ModelError": "errors",
         "Odometry": "models",
         "Outage": "slat",
-        "PiecewiseAcceleration": "slat_models",
+        "PiecewiseAcceleration": "slat.models",
         "Position": "models",
         "ProcessModel": "models",
         "RangeBearing": "models",
@@ -113,14 +117,16 @@ else:
         "SlatRun": "slat",
         "Slatf": "slat",
         "SlatfJoint": "slat",
-        "Sonar": "slat_models",
+        "Sonar": "slat.models",
         "SpeedHeading": "models",
         "Status": "_core",
         "UNKNOWN_MASTER": "slat",
         "Ukf": "filters",
-        "UnicycleMotion": "slat_models",
+        "UnicycleMotion": "slat.models",
         "Unit": "kernels",
         "WhiteAcceleration": "models",
+        "get_include": "_headers",
+        "load_models": "models.library",
         "self_test": "_core",
     }
     __all__ = sorted([*_HOME, *_SUBMODULES])

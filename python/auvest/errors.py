@@ -46,3 +46,7 @@ class FilterError(ValueError):
 
 def _rebuild(action: str, status: Status, step: int | None, partial: Any, hint: str) -> FilterError:
     return FilterError(action, status, step=step, partial=partial, hint=hint)
+
+
+class ModelError(ValueError):
+    """A header with models cannot be loaded; the message begins with the line that is wrong."""

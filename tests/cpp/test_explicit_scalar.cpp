@@ -255,7 +255,7 @@ struct Slat {
       u(0) = Scalar(2);
       u(1) = Scalar(0.1);
       REQUIRE(filter.predict(Scalar(1), u, random, &change) == auvest::Status::kOk);
-      auvest::Sighting<Scalar> seen;
+      auvest::Echo<Scalar> seen;
       seen.master = 0;
       seen.z(0) = Scalar(50 - k);
       seen.z(1) = Scalar(-1.5);

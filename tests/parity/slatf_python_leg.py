@@ -43,11 +43,11 @@ def replay_in_python(record: Record, lanes: str) -> tuple[np.ndarray, np.ndarray
         version=1 if record.kind == "slatf1" else 2,
         particles=record.particles,
         motion=CompassMotion(
-            sigma_speed_mps=record.sigma_speed_mps,
+            sigma_speed_m_s=record.sigma_speed_m_s,
             sigma_heading_rad=record.sigma_heading_rad,
             compensate_bias=record.compensate_bias,
         ),
-        master=PiecewiseAcceleration(acceleration_mps2=record.acceleration_mps2),
+        master=PiecewiseAcceleration(acceleration_m_s2=record.acceleration_m_s2),
         sonar=Sonar(sigma_range_m=record.sigma_range_m, sigma_bearing_rad=record.sigma_bearing_rad),
         resample_below=record.resample_below,
         gate=record.gate,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from filter_support import same_bits
+from filter_support import PAPER, same_bits
 
 import auvest
 from auvest import Decision, LeaderRange, Odometry, RangeBearing, RejectionStreak, SpeedHeading
@@ -17,7 +17,7 @@ def approaching(kind):
     """A craft 6 m east of a station at the origin that comes in at 2 m/s, known to 1 cm."""
     given = {
         "process": auvest.ConstantAcceleration(),
-        "measurement": RangeBearing(station=(0.0, 0.0), near_field=5.0),
+        "sensors": RangeBearing(station=(0.0, 0.0), near_field=5.0),
     }
     return kind([6.0, 0.0, -2.0, 0.0, 0.0, 0.0], 1e-4 * np.eye(6), **given)
 
@@ -42,14 +42,14 @@ def ranging(kind=auvest.RobustEkf, **options):
     """A craft that stands at the origin, 100 m from a leader, and takes 1 m for its own doubt."""
     given = {
         "process": SpeedHeading(),
-        "measurement": LeaderRange(leader=(100.0, 0.0), sigma_range_m=1.0),
+        "sensors": LeaderRange(leader=(100.0, 0.0), sigma_range_m=1.0),
         **options,
     }
     return kind([0.0, 0.0], np.eye(2), **given)
 
 
 def still(rows):
-    return {"dt": 1.0, "motion": np.zeros((rows, 3))}
+    return {"dt": 1.0, "input": np.zeros((rows, 3))}
 
 
 @pytest.mark.parametrize("kind", ROBUST)
@@ -94,7 +94,7 @@ def test_kappa_is_3_minus_n_unless_given(process, states):
     def ukf(**options):
         start, spread = np.zeros(states), np.diag([400.0, 400.0, 0.25][:states])
         return auvest.RobustUkf(
-            start, spread, process=process, measurement=LeaderRange(leader=(100.0, 0.0)), **options
+            start, spread, process=process, sensors=LeaderRange(leader=(100.0, 0.0)), **options
         )
 
     default = bits(ukf())
@@ -113,6 +113,6 @@ def skewed(share):
 
 @pytest.mark.parametrize("kind", PLAIN)
 def test_p0_is_symmetric_to_a_millionth_of_its_standard_deviations(kind):
-    assert np.array_equal(kind(np.zeros(6), skewed(1e-7)).P, np.diag(np.diag(skewed(0.0))))
+    assert np.array_equal(kind(np.zeros(6), skewed(1e-7), **PAPER).P, np.diag(np.diag(skewed(0.0))))
     with pytest.raises(ValueError, match=r"P0 must be symmetric, but P0\[0, 1\] is 0\.006"):
-        kind(np.zeros(6), skewed(1e-5))
+        kind(np.zeros(6), skewed(1e-5), **PAPER)

@@ -9,12 +9,12 @@ import pytest
 import auvest
 
 SONAR = auvest.Sonar(sigma_range_m=0.3, sigma_bearing_rad=0.003, bearing="from_heading")
-MOTION = auvest.UnicycleMotion(sigma_speed_mps=0.01, sigma_yaw_rate_radps=1e-4)
+MOTION = auvest.UnicycleMotion(sigma_speed_m_s=0.01, sigma_yaw_rate_rad_s=1e-4)
 MASTER = auvest.Imm(
-    straight=auvest.ConstantVelocity(velocity_psd=1e-4, sigma_acceleration_mps2=0.3),
+    straight=auvest.ConstantVelocity(velocity_psd=1e-4, sigma_acceleration_m_s2=0.3),
     accelerated=auvest.ConstantAcceleration(position_psd=0, velocity_psd=0, acceleration_psd=1e-4),
     turning=auvest.CoordinatedTurn(
-        position_psd=0, velocity_psd=0, acceleration_psd=1e-4, slow_mps=0.1
+        position_psd=0, velocity_psd=0, acceleration_psd=1e-4, slow_m_s=0.1
     ),
     share=(0.6, 0.2, 0.2),
     switch_rate_hz=0.02,
@@ -114,8 +114,8 @@ def test_bad_input_names_the_argument(arguments, error, names):
 
 
 def test_bad_models():
-    with pytest.raises(ValueError, match="slow_mps"):
-        auvest.CoordinatedTurn(slow_mps=0)
+    with pytest.raises(ValueError, match="slow_m_s"):
+        auvest.CoordinatedTurn(slow_m_s=0)
     with pytest.raises(ValueError, match="velocity_psd"):
         auvest.ConstantVelocity(velocity_psd=-1)
     with pytest.raises(ValueError, match="lanes"):

@@ -1,5 +1,6 @@
 """The wheel and the sdist: what they contain, and that the wheel works outside the source tree."""
 
+import os
 import re
 import subprocess
 import sys
@@ -8,6 +9,7 @@ import zipfile
 from importlib.metadata import version
 
 import pytest
+from conftest import ROOT
 
 import auvest
 
@@ -40,10 +42,63 @@ def test_wheel_contents(wheel):
         names = archive.namelist()
     package = [name for name in names if ".dist-info/" not in name]
     assert {"auvest/__init__.py", "auvest/_core.pyi", "auvest/py.typed"} <= set(package)
+    templates = [*(ROOT / "python").rglob("*.md"), *(ROOT / "python").rglob("*.toml")]
+    assert len(templates) > 10
+    assert {str(path.relative_to(ROOT / "python")) for path in templates} <= set(package)
     assert [name for name in package if re.fullmatch(r"auvest/_core\..*\.so", name)]
-    # No tests, no C++, no caches: only the package.
+    # No tests, no sources in C++, no caches: only the package and its headers.
     assert not [name for name in package if not name.startswith("auvest/")]
-    assert not [name for name in package if re.search(r"test|\.[ch]pp$|__pycache__", name)]
+    python = [name for name in package if not name.startswith("auvest/include/")]
+    assert not [name for name in python if re.search(r"test|\.[ch]pp$|__pycache__", name)]
+    headers = [name.split("/")[2] for name in package if name.startswith("auvest/include/")]
+    assert set(headers) == {"Eigen", "auvest", "desk"}
+
+
+def test_wheel_ships_what_models_are_compiled_against(wheel, root, tmp_path):
+    """All headers of the core and the desk, those of Eigen that they need, and its licence."""
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(tmp_path)
+    include = tmp_path / "auvest" / "include"
+    for folder in (root / "cpp" / "include" / "auvest", root / "cpp" / "desk"):
+        for path in folder.rglob("*.hpp"):
+            shipped = include / folder.name / path.relative_to(folder)
+            assert shipped.read_bytes() == path.read_bytes()
+    assert "Mozilla Public License Version 2.0" in (include / "Eigen/COPYING.MPL2").read_text()
+    # The compiler finds all in there, and takes Eigen from nowhere else.
+    (tmp_path / "all.cpp").write_text('#include "auvest/auvest.hpp"\n#include "desk/library.hpp"\n')
+    command = ["g++", "-std=c++17", "-M", "-I", include, tmp_path / "all.cpp"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    named = re.findall(r"\S*/(?:Eigen|auvest|desk)/\S+", done.stdout)
+    assert len(named) > 150
+    assert all(name.startswith(str(include)) for name in named)
+
+
+@pytest.mark.skipif("AUVEST_SLOW_TESTS" not in os.environ, reason="AUVEST_SLOW_TESTS is not set")
+def test_load_models_from_an_installed_wheel(wheel, root, tmp_path, run):
+    """In an empty environment, with the dependencies from where pip finds them."""
+    run(sys.executable, "-m", "venv", tmp_path / "venv")
+    python = tmp_path / "venv" / "bin" / "python"
+    run(python, "-m", "pip", "install", "--quiet", wheel)
+    (tmp_path / "my_models.hpp").write_bytes((root / "cpp/examples/my_models.hpp").read_bytes())
+    code = (
+        "import auvest\n"
+        "models = auvest.load_models('my_models.hpp')\n"
+        "eye = [[float(i == j) for i in range(6)] for j in range(6)]\n"
+        "ukf = auvest.Ukf([1, 2, 0, 0, 0, 0], eye,"
+        " process=models.MyAcceleration(), sensors=models.MyRangeBearing(), dtype='float32')\n"
+        "ukf.predict(0.1)\n"
+        "ukf.update([3, 0.5])\n"
+        "print(auvest.get_include(), models.path, ukf.innovation)\n"
+    )
+    environment = {
+        "PATH": os.environ["PATH"],
+        "HOME": str(tmp_path),
+        "AUVEST_CACHE": str(tmp_path / "cache"),
+    }
+    printed = run(python, "-c", code, env=environment)
+    assert printed.startswith(str(tmp_path / "venv"))
+    assert len(list((tmp_path / "cache").glob("*.so"))) == 1
 
 
 def test_wheel_outside_the_source_tree(wheel, declared_version, tmp_path, run):

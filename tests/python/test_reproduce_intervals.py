@@ -11,7 +11,8 @@ from result_support import tracking_result
 from typer.testing import CliRunner
 
 from auvest.cli import app
-from auvest.reproduce import intervals
+from auvest.reproduce.intervals import measure as intervals
+from auvest.reproduce.intervals.page import page
 
 PAGE = ROOT / "docs" / "reproduction" / "intervals"
 
@@ -148,8 +149,8 @@ def test_committed_page_is_that_of_the_committed_results(committed):
         )
         for c in committed["cases"]
     ]
-    page = intervals.page(cases, runs=committed["runs"], seed=committed["seed"])
-    assert page == (PAGE / "README.md").read_text()
+    result = intervals.Reproduction(committed["runs"], committed["seed"], cases)
+    assert page(result) == (PAGE / "README.md").read_text()
     assert (PAGE / "intervals.png").stat().st_size > 10_000
 
 

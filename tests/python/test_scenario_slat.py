@@ -112,7 +112,7 @@ def test_variants_reach_the_filter() -> None:
     wild = replace(SHORT, outlier=0.1, runs=20)
     bare, gated = (simulate(EkfSlat(START, CERTAIN, gate=g), wild).rmse_m for g in (0, 16))
     assert bare > 3 * gated
-    stiff = EkfSlat(START, CERTAIN, master=PiecewiseAcceleration(acceleration_mps2=0))
+    stiff = EkfSlat(START, CERTAIN, master=PiecewiseAcceleration(acceleration_m_s2=0))
     turning = SlatScenario(runs=5)
     assert simulate(stiff, turning).rmse_m < 50
     assert simulate(stiff, replace(turning, plan_known=False)).rmse_m > 100
@@ -180,10 +180,10 @@ def test_limits_of_a_scenario() -> None:
 
 def test_a_scenario_tells_the_filter_its_noise() -> None:
     scenario = SlatScenario(
-        sigma_speed_mps=0.5, sigma_heading_rad=0.25, sigma_range_m=3.0, sigma_bearing_rad=0.125
+        sigma_speed_m_s=0.5, sigma_heading_rad=0.25, sigma_range_m=3.0, sigma_bearing_rad=0.125
     )
     motion, sonar = scenario.motion, scenario.sonar
-    assert (motion.sigma_speed_mps, motion.sigma_heading_rad) == (0.5, 0.25)
+    assert (motion.sigma_speed_m_s, motion.sigma_heading_rad) == (0.5, 0.25)
     assert motion.compensate_bias
     assert (sonar.sigma_range_m, sonar.sigma_bearing_rad) == (3.0, 0.125)
 
@@ -199,11 +199,11 @@ def test_a_scenario_tells_the_filter_its_noise() -> None:
         (lambda: SlatScenario(duration_s=1e12), "runs . pings must lie in"),
         (lambda: SlatScenario(dropout=1.5), r"dropout must lie in 0\.\.1, not 1.5"),
         (lambda: SlatScenario(odometry_per_ping=0), "odometry_per_ping must lie in 1"),
-        (lambda: SlatScenario(sigma_speed_mps=-1), "sigma_speed_mps must not be negative"),
+        (lambda: SlatScenario(sigma_speed_m_s=-1), "sigma_speed_m_s must not be negative"),
         (lambda: SlatScenario(identified=1), "identified must be True or False"),
         (lambda: SlatScenario(runs=0), "runs must lie in 1"),
         (lambda: SlatScenario(seed=2**64), "seed must lie in"),
-        (lambda: Vehicle(speed_mps=np.nan), "speed_mps must be finite"),
+        (lambda: Vehicle(speed_m_s=np.nan), "speed_m_s must be finite"),
         (lambda: paper_masters(5), r"count must lie in 1\.\.4"),
         (lambda: simulate(3), "filter must be an auvest.Slatf"),
         (lambda: simulate(Slatf(START, CERTAIN), 3), "scenario must be an auvest.SlatScenario"),

@@ -20,6 +20,7 @@ from auvest import (
     Outage,
     PiecewiseAcceleration,
     Slatf,
+    SlatfJoint,
     Sonar,
     Status,
     UnicycleMotion,
@@ -197,7 +198,7 @@ def test_the_seed_decides() -> None:
 
 @pytest.mark.parametrize("compensate", [True, False])
 def test_dead_reckoning_is_equation_2(compensate: bool) -> None:
-    motion = CompassMotion(sigma_speed_mps=1.5, sigma_heading_rad=0.2, compensate_bias=compensate)
+    motion = CompassMotion(sigma_speed_m_s=1.5, sigma_heading_rad=0.2, compensate_bias=compensate)
     filter_ = DeadReckoning([10, -3], np.diag([0.5, 0.25]), motion=motion)
     filter_.predict(2.0, [4.0, 0.7])
     reach = 2.0 * (np.exp(0.02) if compensate else 1.0)
@@ -217,7 +218,7 @@ def test_ekf_slat_is_the_textbook_filter(bearing: Any) -> None:
     q, dt = 0.02, 0.5
     sonar = Sonar(sigma_range_m=2, sigma_bearing_rad=0.1, bearing=bearing)
     p0 = np.array([[4.0, 1.0], [1.0, 9.0]])
-    filter_ = EkfSlat(START, p0, master=PiecewiseAcceleration(acceleration_mps2=q), sonar=sonar)
+    filter_ = EkfSlat(START, p0, master=PiecewiseAcceleration(acceleration_m_s2=q), sonar=sonar)
     filter_.add_master(MASTER_X, 25 * np.eye(6))
     filter_.add_master(SECOND_X, 16 * np.eye(6))
     changes = np.array([[0.2, -0.1], [0.05, 0.3]])
@@ -233,7 +234,7 @@ def test_ekf_slat_is_the_textbook_filter(bearing: Any) -> None:
     c, s = np.cos(0.4), np.sin(0.4)
     g = reach * np.array([[c, -5 * s], [s, 5 * c]])
     Q = np.zeros((14, 14))
-    Q[:2, :2] = g @ np.diag([motion.sigma_speed_mps**2, motion.sigma_heading_rad**2]) @ g.T
+    Q[:2, :2] = g @ np.diag([motion.sigma_speed_m_s**2, motion.sigma_heading_rad**2]) @ g.T
     phi1 = np.eye(6) + dt * np.eye(6, k=2) + dt**2 / 2 * np.eye(6, k=4)
     gain = np.kron(np.array([[dt**2 / 2], [dt], [1.0]]), np.eye(2))
     Phi = np.eye(14)
@@ -321,7 +322,7 @@ def test_an_unknown_echo_goes_to_its_master() -> None:
 
 
 def test_a_master_is_born_from_an_unknown_echo() -> None:
-    filter_ = Slatf(START, CERTAIN, gate=16, birth_velocity_mps=2)
+    filter_ = Slatf(START, CERTAIN, gate=16, birth_velocity_m_s=2)
     assert filter_.masters == 0
     filter_.update([100, np.pi / 2])  # the bearing points from the master to the slave
     assert filter_.masters == 1
@@ -429,8 +430,8 @@ BAD_MAKE: list[tuple[dict[str, Any], str]] = [
     ({"resample_below": 1.5}, r"resample_below must lie in 0\.\.1, not 1.5"),
     ({"gate": -1}, "gate must not be negative"),
     ({"carry_covariance": 1}, "carry_covariance must be True or False"),
-    ({"birth_velocity_mps": 1}, "birth_velocity_mps needs a gate"),
-    ({"birth_acceleration_mps2": 0}, "birth_acceleration_mps2 must be positive"),
+    ({"birth_velocity_m_s": 1}, "birth_velocity_m_s needs a gate"),
+    ({"birth_acceleration_m_s2": 0}, "birth_acceleration_m_s2 must be positive"),
     ({"motion": Sonar()}, "motion must be an auvest.CompassMotion or auvest.UnicycleMotion"),
     ({"master": None}, "master must be an auvest.PiecewiseAcceleration"),
     ({"sonar": 3}, "sonar must be an auvest.Sonar, not int"),
@@ -506,11 +507,11 @@ def test_a_bad_call_is_refused_and_changes_nothing(
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: CompassMotion(sigma_speed_mps=-1), "sigma_speed_mps must not be negative"),
+        (lambda: CompassMotion(sigma_speed_m_s=-1), "sigma_speed_m_s must not be negative"),
         (lambda: CompassMotion(sigma_heading_rad=4), "sigma_heading_rad must be at most 3"),
         (lambda: CompassMotion(compensate_bias=0), "compensate_bias must be True or False"),
-        (lambda: UnicycleMotion(sigma_yaw_rate_radps=np.nan), "sigma_yaw_rate_radps must be fin"),
-        (lambda: PiecewiseAcceleration(acceleration_mps2=-1), "acceleration_mps2 must not be neg"),
+        (lambda: UnicycleMotion(sigma_yaw_rate_rad_s=np.nan), "sigma_yaw_rate_rad_s must be fin"),
+        (lambda: PiecewiseAcceleration(acceleration_m_s2=-1), "acceleration_m_s2 must not be neg"),
         (lambda: Sonar(sigma_range_m=0), "sigma_range_m must be positive"),
         (lambda: Sonar(sigma_bearing_rad=1e-7), "sigma_bearing_rad must be above 1e-6"),
         (lambda: Sonar(bearing="north"), "bearing must be 'master_to_slave'"),
@@ -575,11 +576,111 @@ def test_missing_echoes_change_nothing() -> None:
     assert np.array_equal(filter_.poses, twin.poses)
 
 
+@pytest.mark.parametrize("make", [Slatf, SlatfJoint, EkfSlat, DeadReckoning])
+def test_nan_rows_of_a_record_are_as_if_they_were_not_there(make: Any) -> None:
+    data = record(10, masters=1)
+    there = np.arange(len(data["z"])) % 3 != 1
+    gaps = {**data, "z": np.where(there[:, None], data["z"], np.nan)}
+    less = {**data, **{name: data[name][there] for name in ("z", "z_time_s", "master")}}
+    silent = {**gaps, "z": np.full_like(data["z"], np.nan)}
+    nothing = {name: data[name] for name in ("time_s", "u", "changes")}
+    for one, other in ((gaps, less), (silent, nothing)):
+        made = [with_masters(make(START, CERTAIN), 1) for _ in range(2)]
+        runs = [filter_.run(**each) for filter_, each in zip(made, (one, other), strict=True)]
+        assert everything(made[0], runs[0]) == everything(made[1], runs[1])
+        assert made[0].save() == made[1].save()
+
+
+def test_a_result_has_the_times_of_its_rows() -> None:
+    data = record(10)
+    result = with_masters(EkfSlat(START, CERTAIN)).run(**data)
+    assert np.array_equal(result.time_s, data["time_s"][1:])
+    frame = result.to_pandas(["x", "masters_x"])
+    assert list(frame.index) == list(data["time_s"][1:])
+    assert list(frame)[:4] == ["x_0", "x_1", "masters_x_0_0", "masters_x_0_1"]
+    assert list(frame["masters_x_1_3"]) == list(result.masters_x[:, 1, 3])
+
+
+def wide(value: Any) -> Any:
+    """Every other column of a wider array: not contiguous."""
+    array = np.asarray(value, float)
+    return np.repeat(array, 2, axis=-1)[..., ::2]
+
+
+#: (dt, u, z, master) that mean the same, as users may write them.
+SAME: list[tuple[Any, Any, Any, Any]] = [
+    (2.0, np.array([5, 0.5]), np.array([300.0, -1.5]), 0),
+    (2, [5, 0.5], [300, -1.5], 0),
+    (np.float64(2), (5.0, 0.5), (300, -1.5), np.int32(0)),
+    (np.float32(2), np.array([5, 0.5], np.float32), np.array([[300, -1.5]], np.float32), [0]),
+    (np.array(2.0), np.array([5, 0.5], np.float16), [[300, -1.5]], np.array([0])),
+    (2, wide([5, 0.5]), wide([300, -1.5]), np.array(0)),
+    (2, [np.float32(5), 0.5], wide([[300, -1.5]]), np.array([0], np.uint8)),
+    (2, np.array([5, 0.5], ">f8"), np.array([300, -1.5], ">f4"), 0),
+    (2, [5, 0.5], [[np.nan, np.nan], [300, -1.5]], [1, 0]),
+    (2, [5, 0.5], np.array([[300, -1.5]] + 9 * [[np.nan] * 2]), [0] + 9 * [1]),
+]
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_numbers_mean_the_same_however_they_are_written(dtype: Any) -> None:
+    states = []
+    for dt, u, z, master in SAME:
+        for fused in (False, True):
+            filter_ = with_masters(Slatf(START, CERTAIN, dtype=dtype))
+            if fused:
+                filter_.step(dt, u, z, master)
+            else:
+                filter_.predict(dt, u)
+                filter_.update(z, master)
+            states.append(filter_.save())
+    assert set(states) == {states[0]}
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_plans_mean_the_same_however_they_are_written(dtype: Any) -> None:
+    plan = [[1, 2], [0.5, -0.25]]
+    states = []
+    for changes in (plan, np.array(plan, dtype), np.array(plan, np.float16), wide(plan)):
+        filter_ = with_masters(EkfSlat(START, CERTAIN, dtype=dtype))
+        filter_.predict(2, [5, 0.5], changes=changes)
+        assert filter_.master(1)[0][2] == SECOND_X[2] + 0.5
+        states.append(filter_.save())
+    assert set(states) == {states[0]}
+
+
+def test_what_is_no_number_is_not_taken_for_one() -> None:
+    filter_ = fresh()
+    masked = np.ma.masked_array([300.0, -1.5], mask=[True, False])
+    bad: list[tuple[Callable[[], object], str]] = [
+        (lambda: filter_.predict(True, [5, 0]), "dt must be a number, not bool"),
+        (lambda: filter_.predict("1", [5, 0]), "dt must be a number, not str"),  # type: ignore[arg-type]
+        (lambda: filter_.predict(10**400, [5, 0]), "dt must be finite"),
+        (lambda: filter_.predict(1, [5, None]), "u must be an array"),  # type: ignore[list-item]
+        (lambda: filter_.predict(1, [5, 10**400]), "u must be an array"),
+        (lambda: filter_.predict(1, masked), "u must be .* not a masked array"),
+        (lambda: filter_.update(masked, 0), "z must be .* not a masked array"),
+        (lambda: filter_.update([300, -1.5], True), "master must be an int"),
+        (lambda: filter_.update([300, -1.5], 2**80), "master"),
+        (lambda: filter_.update(np.zeros((1, 1, 2)), 0), "z has shape"),
+        (lambda: filter_.update(np.zeros((5, 2)), [0, 1, 2, 3, 4]), "master is 2"),
+        (lambda: filter_.update(np.zeros((5, 2)), -1), "z has 5 echoes; at most 4"),
+    ]
+    for call, message in bad:
+        with pytest.raises((ValueError, TypeError), match=message):
+            call()
+    single = Slatf(START, CERTAIN, dtype="float32")
+    with pytest.raises(ValueError, match=r"u\[0\] is 1e\+39: beyond the range of float32"):
+        single.predict(1, [1e39, 0])
+    with pytest.raises(ValueError, match=r"dt = 1e\+39 is beyond the range of float32"):
+        single.predict(1e39, [5, 0])
+
+
 def test_defaults_are_those_of_the_core() -> None:
     """One default, in C++: section 7's noise."""
-    assert (CompassMotion().sigma_speed_mps, CompassMotion().sigma_heading_rad) == (2, 0.3)
+    assert (CompassMotion().sigma_speed_m_s, CompassMotion().sigma_heading_rad) == (2, 0.3)
     assert (Sonar().sigma_range_m, Sonar().sigma_bearing_rad) == (1, 0.06)
-    assert PiecewiseAcceleration().acceleration_mps2 == 1e-4
+    assert PiecewiseAcceleration().acceleration_m_s2 == 1e-4
     assert available_lanes("float64") == ("scalar",)
     assert available_lanes()[0] == "scalar"
     assert fresh().lanes == "scalar"

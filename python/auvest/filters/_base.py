@@ -63,6 +63,8 @@ class GaussianFilter:
 
     #: How the core linearises: its number in ``AnyLinearisation``.
     _linearisation: ClassVar[int]
+    #: Whether it asks models for their Jacobians.
+    _jacobians: ClassVar[bool] = False
 
     def __init__(
         self,
@@ -84,7 +86,10 @@ class GaussianFilter:
     ) -> None:
         self._dtype = as_dtype(dtype)
         self._process: ProcessModel = as_instance("process", process, ProcessModel)
+        self._require_jacobian(self._process)
         self._sensors = _as_sensors(sensors, self._process)
+        for model in self._sensors.values():
+            self._require_jacobian(model)
         self._kernel = None if kernel is None else as_kernel(kernel)
         if recovery is not None:
             as_instance("recovery", recovery, RejectionStreak)
@@ -94,9 +99,9 @@ class GaussianFilter:
                 )
         self._recovery = recovery
         if policy is not None:
-            as_instance("policy", policy, IntervalPolicy.__args__)  # type: ignore[attr-defined]
+            as_instance("policy", policy, IntervalPolicy.__args__)
         self._policy = policy
-        self._options = {
+        self._options: dict[str, Any] = {
             "late_s": as_number("late_s", late_s, "not negative"),
             "residual": as_kind("residual", residual, ("innovation", "post-fit")),
             "max_iterations": as_integer("max_iterations", max_iterations, 2, 255),
@@ -483,9 +488,10 @@ class GaussianFilter:
             columns["interval_s"] = None
         if self.late_s == 0:
             columns["too_late"] = None
-        result = RunResult(
-            **{key: None if column is None else column[:done] for key, column in columns.items()}
-        )
+        kept: dict[str, Any] = {
+            key: None if column is None else column[:done] for key, column in columns.items()
+        }
+        result = RunResult(**kept)
         if status != Status.ok:
             error = FilterError("run", status, step=done, partial=result)
             try:
@@ -544,7 +550,7 @@ class GaussianFilter:
         own = {handle.description: handle for handle in self._handles.values()}
         handles = [own.get(json.dumps(model)) or self._rebuilt(model) for model in models]
         events = [None if k < 0 else handles[k] for k in arrays.pop("event_sensor")]
-        report = None
+        report: dict[str, Any] | None = None
         if "report_nis" in arrays:
             flags = [int(flag) for flag in arrays.pop("report_flags")]
             report = {name: arrays.pop(f"report_{name}").ravel() for name in _REPORT}
@@ -616,7 +622,14 @@ class GaussianFilter:
             raise TypeError(f"sensor must be {what}")
         model: MeasurementModel = as_instance("sensor", sensor, MeasurementModel)
         model.check_process(self._process)
+        self._require_jacobian(model)
         return model.core(len(self._process.state), self._dtype)
+
+    def _require_jacobian(self, model: ProcessModel | MeasurementModel) -> None:
+        if model.lacks and self._jacobians:
+            raise ValueError(
+                f"{type(model).__name__} has no {model.lacks}: an Ekf needs it; use Ukf or Ckf"
+            )
 
     def _as_sensor_rows(
         self, sensor: str | MeasurementModel | Sequence[str] | None
@@ -693,7 +706,7 @@ class GaussianFilter:
     def _as_place(self, place: npt.ArrayLike, handle: _Sensor[Any]) -> Floats:
         if handle.place == 0:
             raise TypeError("place must be None: the place of this sensor is no part of its model")
-        given = np.atleast_1d(place) if handle.place == 1 else place  # type: ignore[arg-type]
+        given = np.atleast_1d(place) if handle.place == 1 else place
         return as_array("place", given, (handle.place,), self._dtype)
 
     def _as_places(

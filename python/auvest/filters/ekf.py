@@ -54,6 +54,7 @@ class Ekf(GaussianFilter):
     """
 
     _linearisation = 0
+    _jacobians = True
 
 
 class RobustEkf(Ekf):

@@ -10,6 +10,7 @@ from auvest.models.constant_acceleration import ConstantAcceleration
 from auvest.models.depth import Depth
 from auvest.models.functions import FunctionProcess, FunctionSensor, from_names
 from auvest.models.leader_range import LeaderRange
+from auvest.models.library import from_header
 from auvest.models.odometry import Odometry
 from auvest.models.position import Position
 from auvest.models.range_bearing import RangeBearing
@@ -40,6 +41,8 @@ def from_description(description: dict[str, Any]) -> Model:
     name = params.pop("class", None)
     if name == "FunctionSensor":
         return from_names(params)
+    if "header" in params:
+        return from_header(name, params)
     model = {**PROCESSES, **SENSORS}.get(name)
     if model is None:
         raise ValueError(f"there is no model {name!r}")

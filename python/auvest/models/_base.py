@@ -63,6 +63,9 @@ class Model:
     #: Whether the sigmas are squared before they are used.
     _squares: ClassVar[bool] = False
 
+    #: What a model of one's own has left out that an EKF needs: ``"H(x)"``; empty: nothing.
+    lacks: ClassVar[str] = ""
+
     def _handle(self, key: Any, make: Any) -> Any:
         handles = self.__dict__.get("_handles")
         if handles is None:
@@ -133,9 +136,11 @@ class ProcessModel(Model):
         self, dt: float, x: npt.ArrayLike | None = None, input: npt.ArrayLike | None = None
     ) -> npt.NDArray[np.float64]:
         """Jacobian (n, n) of ``f`` at ``x``, in float64; a linear process needs no ``x``."""
-        state = np.zeros(len(self.state))
+        if self.lacks:
+            raise ValueError(f"{type(self).__name__} has no {self.lacks}")
+        state: npt.NDArray[np.float64] = np.zeros(len(self.state))
         if x is not None:
-            state = as_array("x", x, (len(self.state),), _FLOAT64)
+            state = as_array("x", x, (len(self.state),), _FLOAT64).astype(np.float64)
         phi: npt.NDArray[np.float64] = self.core(_FLOAT64).Phi(
             state, as_number("dt", dt, "not negative"), self._as_input(input)
         )
@@ -151,7 +156,7 @@ class ProcessModel(Model):
     def _as_input(self, input: npt.ArrayLike | None) -> npt.NDArray[np.float64]:
         if input is None:
             return np.zeros(len(self.input))
-        return as_array("input", input, (len(self.input),), _FLOAT64)
+        return as_array("input", input, (len(self.input),), _FLOAT64).astype(np.float64)
 
 
 class MeasurementModel(Model):
@@ -176,6 +181,10 @@ class MeasurementModel(Model):
     def _core_defaults(self) -> dict[str, float]:
         return _core.sensor_defaults(self.core_name)
 
+    def _how_for_more(self, states: int) -> str:  # noqa: ARG002
+        """Say how to make it for another number of states; empty where there is no way."""
+        return ""
+
     def core(self, states: int, dtype: DType) -> _Sensor[Any]:
         """Give the core's measurement model for so many states in this precision.
 
@@ -191,6 +200,7 @@ class MeasurementModel(Model):
                 numbers = ", ".join(str(n) for n in known)
                 raise ValueError(
                     f"{type(self).__name__} is made for {numbers} states, not for {states}"
+                    f"{self._how_for_more(states)}"
                 )
             make_sensor = getattr(_core, f"make_sensor_{dtype.name}")
             sensor = make_sensor(self.core_name, states, self.values(dtype.name))
@@ -237,4 +247,9 @@ class MeasurementModel(Model):
                 f"{type(self).__name__} observes {', '.join(self.observes)}, but the state of "
                 f"{type(process).__name__} begins with "
                 f"{', '.join(process.state[: len(self.observes)])}"
+                f"{self._how_to_name(process)}"
             )
+
+    def _how_to_name(self, process: ProcessModel) -> str:  # noqa: ARG002
+        """Say how the states get names; empty where they have theirs."""
+        return ""

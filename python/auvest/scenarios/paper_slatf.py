@@ -15,7 +15,7 @@ import numpy as np
 from auvest.scenarios.paper_aukf import Assumption, DTypeName
 from auvest.scenarios.slat import SlatScenario
 from auvest.slat import DeadReckoning, EkfSlat, Slatf, SlatFilter, SlatfJoint
-from auvest.slat_models import PiecewiseAcceleration
+from auvest.slat.models import PiecewiseAcceleration
 
 #: The columns of Table 1, ours beside the paper's.
 FilterName: TypeAlias = Literal[
@@ -78,7 +78,7 @@ def paper_filter(
     particles: int = PARTICLES,
     compensate_bias: bool = True,
     carry_covariance: bool = False,
-    acceleration_mps2: float = PiecewiseAcceleration().acceleration_mps2,
+    acceleration_m_s2: float = PiecewiseAcceleration().acceleration_m_s2,
     dtype: DTypeName = "float64",
 ) -> SlatFilter:
     """Set up a filter as the scenario needs it: it knows the noise of all sensors.
@@ -93,7 +93,7 @@ def paper_filter(
         Make up for the bias of the heading's noise, except in "dr".
     carry_covariance : bool
         Eq. (50) to the letter, in "slatf2".
-    acceleration_mps2 : float
+    acceleration_m_s2 : float
         q of the master's model.
     dtype : {"float64", "float32"}
         Precision.
@@ -103,7 +103,7 @@ def paper_filter(
     motion = replace(scenario.motion, compensate_bias=compensate_bias and name != "dr")
     if name in ("dr", "dr_compensated"):
         return DeadReckoning(x0, P0, motion=motion, dtype=dtype)
-    master = PiecewiseAcceleration(acceleration_mps2=acceleration_mps2)
+    master = PiecewiseAcceleration(acceleration_m_s2=acceleration_m_s2)
     if name == "ekf_slat":
         return EkfSlat(x0, P0, motion=motion, master=master, sonar=scenario.sonar, dtype=dtype)
     if name == "slatf_joint":
@@ -131,7 +131,7 @@ def paper_filter(
 
 _R1 = SlatScenario()
 _MASTER = _R1.masters[0]
-_Q = PiecewiseAcceleration().acceleration_mps2
+_Q = PiecewiseAcceleration().acceleration_m_s2
 
 #: Everything the simulation needs and the paper does not say, or says in two ways.
 ASSUMPTIONS: tuple[Assumption, ...] = (
@@ -152,8 +152,8 @@ ASSUMPTIONS: tuple[Assumption, ...] = (
     Assumption(
         "What the slave is told of the master when communication breaks",
         "not stated",
-        f"position to {_R1.prior_position_m:g} m, velocity to {_R1.prior_velocity_mps:g} m/s, "
-        f"acceleration to {_R1.prior_acceleration_mps2:g} m/s^2, drawn accordingly",
+        f"position to {_R1.prior_position_m:g} m, velocity to {_R1.prior_velocity_m_s:g} m/s, "
+        f"acceleration to {_R1.prior_acceleration_m_s2:g} m/s^2, drawn accordingly",
         "the velocity decides how good any filter can be, see Sensitivity",
     ),
     Assumption(

@@ -19,7 +19,7 @@ from auvest import _core, metrics, montecarlo
 from auvest._arguments import as_flag, as_instance, as_integer, as_number
 from auvest._core import Status
 from auvest.slat import MAX_MASTERS, DeadReckoning, EkfSlat, Slatf, SlatFilter, SlatfJoint
-from auvest.slat_models import CompassMotion, Sonar, core_sonar
+from auvest.slat.models import CompassMotion, Sonar, core_sonar
 
 _DEFAULTS = _core.slat_scenario_defaults()
 _PARAMS = _DEFAULTS["params"]
@@ -41,20 +41,20 @@ class Vehicle:
         Position at time 0, m.
     heading_rad : float
         From the x axis towards the y axis.
-    speed_mps : float
+    speed_m_s : float
         10 kn in the paper.
     turn_start_s : float
         When it starts to turn.
-    turn_rate_radps : float
+    turn_rate_rad_s : float
         Positive towards +y; 0: it never turns.
     """
 
     x_m: float = _SLAVE["x_m"]
     y_m: float = _SLAVE["y_m"]
     heading_rad: float = _SLAVE["heading_rad"]
-    speed_mps: float = _SLAVE["speed_mps"]
+    speed_m_s: float = _SLAVE["speed_m_s"]
     turn_start_s: float = _SLAVE["turn_start_s"]
-    turn_rate_radps: float = _SLAVE["turn_rate_radps"]
+    turn_rate_rad_s: float = _SLAVE["turn_rate_rad_s"]
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -82,7 +82,7 @@ class SlatScenario:
         Period of the slave's readings, s.
     odometry_per_ping : int
         Readings per ping of the sonar.
-    sigma_speed_mps, sigma_heading_rad : float
+    sigma_speed_m_s, sigma_heading_rad : float
         Noise of the readings, standard deviations.
     sigma_range_m, sigma_bearing_rad : float
         Noise of the sonar, standard deviations.
@@ -96,7 +96,7 @@ class SlatScenario:
         The filter is told whose echo it hears.
     plan_known : bool
         The filter knows the masters' velocity changes, u of Eq. (4).
-    prior_position_m, prior_velocity_mps, prior_acceleration_mps2 : float
+    prior_position_m, prior_velocity_m_s, prior_acceleration_m_s2 : float
         Standard deviations of what the slave was told of each master.
     runs : int
         Number of runs.
@@ -110,7 +110,7 @@ class SlatScenario:
     duration_s: float = _PARAMS["duration_s"]
     odometry_s: float = _PARAMS["odometry_s"]
     odometry_per_ping: int = _PARAMS["odometry_per_ping"]
-    sigma_speed_mps: float = _PARAMS["sigma_speed_mps"]
+    sigma_speed_m_s: float = _PARAMS["sigma_speed_m_s"]
     sigma_heading_rad: float = _PARAMS["sigma_heading_rad"]
     sigma_range_m: float = _PARAMS["sigma_range_m"]
     sigma_bearing_rad: float = _PARAMS["sigma_bearing_rad"]
@@ -122,8 +122,8 @@ class SlatScenario:
     identified: bool = _PARAMS["identified"]
     plan_known: bool = _PARAMS["plan_known"]
     prior_position_m: float = _PARAMS["prior_position_m"]
-    prior_velocity_mps: float = _PARAMS["prior_velocity_mps"]
-    prior_acceleration_mps2: float = _PARAMS["prior_acceleration_mps2"]
+    prior_velocity_m_s: float = _PARAMS["prior_velocity_m_s"]
+    prior_acceleration_m_s2: float = _PARAMS["prior_acceleration_m_s2"]
     runs: int = 50
     seed: int = 1
 
@@ -137,10 +137,10 @@ class SlatScenario:
         for name in ("identified", "plan_known"):
             as_flag(name, getattr(self, name))
         sonar = ("sigma_range_m", "sigma_bearing_rad")
-        prior = ("prior_position_m", "prior_velocity_mps", "prior_acceleration_mps2")
+        prior = ("prior_position_m", "prior_velocity_m_s", "prior_acceleration_m_s2")
         for name in ("duration_s", "odometry_s", *sonar, *prior):
             set_field(self, name, as_number(name, getattr(self, name), "positive"))
-        others = ("sigma_speed_mps", "sigma_heading_rad", "dropout", "outlier", "outlier_sigmas")
+        others = ("sigma_speed_m_s", "sigma_heading_rad", "dropout", "outlier", "outlier_sigmas")
         for name in (*others, "silent_from_s", "silent_to_s"):
             set_field(self, name, as_number(name, getattr(self, name), "not negative"))
         for name in ("dropout", "outlier"):
@@ -167,7 +167,7 @@ class SlatScenario:
     def motion(self) -> CompassMotion:
         """The slave's motion as a filter should know it, with the bias compensated."""
         return CompassMotion(
-            sigma_speed_mps=self.sigma_speed_mps, sigma_heading_rad=self.sigma_heading_rad
+            sigma_speed_m_s=self.sigma_speed_m_s, sigma_heading_rad=self.sigma_heading_rad
         )
 
     @property

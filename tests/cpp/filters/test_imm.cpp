@@ -150,7 +150,7 @@ TEST_CASE("models are refused where shares are none, rates are negative or a mod
     CHECK(ThreeModels(params).check() == Status::kBadParameter);
   }
   auvest::CoordinatedTurn<double>::Params turn;
-  turn.slow_mps = -1;
+  turn.slow_m_s = -1;
   const ThreeModels imm{ThreeModels::Params(), auvest::ConstantVelocity<double>(),
                         auvest::ExactAcceleration<double>(), auvest::CoordinatedTurn<double>(turn)};
   CHECK(imm.check() == Status::kBadParameter);

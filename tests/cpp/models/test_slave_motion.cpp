@@ -89,7 +89,7 @@ TEST_CASE("slave motion: Phi and G Q G' are those of f1") {
   check_motion(Compass(compass), Vector<double, 2>(2, 0.3));
   Unicycle::Params unicycle;
   check_motion(Unicycle(unicycle),
-               Vector<double, 2>(unicycle.sigma_speed_mps, unicycle.sigma_yaw_rate_radps));
+               Vector<double, 2>(unicycle.sigma_speed_m_s, unicycle.sigma_yaw_rate_rad_s));
 }
 
 template <class Motion>
@@ -177,7 +177,7 @@ TEST_CASE("unicycle motion: the headings of samples stay wrapped through many tu
       double a, b;
       random.normal_pair(a, b);
       motion.sample(step, a, b, pose);
-      turned += 0.5 * (0.4 + motion.params.sigma_yaw_rate_radps * b);
+      turned += 0.5 * (0.4 + motion.params.sigma_yaw_rate_rad_s * b);
       CHECK(pose(2) > -pi);
       CHECK(pose(2) <= pi);
       CHECK(std::fabs(auvest::math::wrap(pose(2) - turned)) < 1e-11);
@@ -190,7 +190,7 @@ TEST_CASE("slave motion: bad parameters") {
   using auvest::Status;
   const auto compass = [](double speed, double heading) {
     Compass::Params params;
-    params.sigma_speed_mps = speed;
+    params.sigma_speed_m_s = speed;
     params.sigma_heading_rad = heading;
     return Compass(params).check();
   };
@@ -200,8 +200,8 @@ TEST_CASE("slave motion: bad parameters") {
   CHECK(compass(1, 3.001) == Status::kBadParameter);
   const auto unicycle = [](double speed, double yaw_rate) {
     Unicycle::Params params;
-    params.sigma_speed_mps = speed;
-    params.sigma_yaw_rate_radps = yaw_rate;
+    params.sigma_speed_m_s = speed;
+    params.sigma_yaw_rate_rad_s = yaw_rate;
     return Unicycle(params).check();
   };
   CHECK(Unicycle().check() == Status::kOk);

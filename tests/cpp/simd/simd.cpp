@@ -237,7 +237,7 @@ struct Run {
       const auvest::Vector<float, 2> u(2.0f,
                                        Filter::kPose > 2 ? 0.05f : 0.05f * static_cast<float>(k));
       REQUIRE(filter.predict(1, u, random, k % 2 == 0 ? changes : nullptr) == auvest::Status::kOk);
-      auvest::Sighting<float> seen[2];
+      auvest::Echo<float> seen[2];
       for (int n = 0; n < 2; ++n) {
         seen[n].master = n;
         const auto master = filter.master(n).x;

@@ -14,14 +14,14 @@
 #include "auvest/models/piecewise_acceleration.hpp"
 #include "auvest/models/slave_motion.hpp"
 #include "auvest/models/sonar.hpp"
-#include "auvest/slat/sighting.hpp"
+#include "auvest/slat/echo.hpp"
 #include "auvest/status.hpp"
 
 namespace slat_test {
 
 using auvest::Belief;
+using auvest::Echo;
 using auvest::Matrix;
-using auvest::Sighting;
 using auvest::Status;
 using auvest::Vector;
 using auvest::math::Random;
@@ -73,7 +73,7 @@ struct FarApart {
   Vector<double, 2> reading;
   double dt = 10;
   Belief<double, 6> master;
-  std::vector<Sighting<double>> echoes;
+  std::vector<Echo<double>> echoes;
 
   FarApart() : motion(small_noise()), sonar(precise()), reading(5, 0.4) {
     start.x << 100, 50;
@@ -87,7 +87,7 @@ struct FarApart {
   void hear(double range_m, double bearing_rad) {
     const auto slave = moved();
     const Vector<double, 2> d(slave.x(0) - 1300, slave.x(1) - 900);
-    Sighting<double> seen;
+    Echo<double> seen;
     seen.master = 0;
     seen.z << d.norm() + range_m, std::atan2(d(1), d(0)) + bearing_rad;
     echoes.push_back(seen);
@@ -95,7 +95,7 @@ struct FarApart {
 
   static Compass<double>::Params small_noise() {
     Compass<double>::Params p;
-    p.sigma_speed_mps = 0.2;
+    p.sigma_speed_m_s = 0.2;
     p.sigma_heading_rad = 0.01;
     return p;
   }
@@ -123,7 +123,7 @@ struct FarApart {
     REQUIRE(filter.add_master(master) == Status::kOk);
     // The master stands: its prior is given for the time of the measurement.
     REQUIRE(filter.predict(dt, reading, random) == Status::kOk);
-    for (const Sighting<double>& seen : echoes) {
+    for (const Echo<double>& seen : echoes) {
       REQUIRE(filter.update(&seen, 1, sonar, random) == Status::kOk);
     }
   }
@@ -173,7 +173,7 @@ struct Grid {
             const double range = std::sqrt(dx * dx + dy * dy);
             const double bearing = std::atan2(dy, dx);
             double misfit = 0;
-            for (const Sighting<double>& seen : problem.echoes) {
+            for (const Echo<double>& seen : problem.echoes) {
               const double r = (seen.z(0) - range) / p.sigma_range_m;
               const double t = auvest::math::wrap(seen.z(1) - bearing) / p.sigma_bearing_rad;
               misfit += r * r + t * t;

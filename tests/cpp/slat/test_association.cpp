@@ -9,14 +9,14 @@
 namespace {
 
 using namespace slat_test;
+using auvest::Echo;
 using auvest::kUnknownMaster;
-using auvest::Sighting;
 using auvest::Status;
 
 /// A filter with a master near (100, 150) and one far from it, after it heard `count` echoes.
 template <class Filter>
 struct Heard : Gated<Filter> {
-  Heard(const Sighting<float>* echoes, int count) {
+  Heard(const Echo<float>* echoes, int count) {
     auvest::math::Random random(87);
     typename Filter::SlaveBelief start;
     start.x.setZero();
@@ -47,14 +47,14 @@ void check_same_masters(const Filter& a, const Filter& b) {
 TEST_CASE_TEMPLATE("association: of two echoes from one place the master there has one", Filter,
                    FloatSlatf1<2>, FloatSlatf2<2>, FloatJoint<2>, FloatEkf<2>) {
   // The other falls to the far master, whose gate refuses it. No matter which of them is named.
-  Sighting<float> echo;
+  Echo<float> echo;
   echo.z << 180.5f, -2.16f;
   echo.master = 0;
-  Sighting<float> unknown = echo;
+  Echo<float> unknown = echo;
   unknown.master = kUnknownMaster;
-  const Sighting<float> two_unknown[2] = {unknown, unknown};
-  const Sighting<float> named_first[2] = {echo, unknown};
-  const Sighting<float> named_last[2] = {unknown, echo};
+  const Echo<float> two_unknown[2] = {unknown, unknown};
+  const Echo<float> named_first[2] = {echo, unknown};
+  const Echo<float> named_last[2] = {unknown, echo};
   const Heard<Filter> once(&echo, 1);
   CHECK(once.filter.master(0).P(0, 0) < 0.01f);
   check_same_masters(once.filter, Heard<Filter>(&unknown, 1).filter);

@@ -11,16 +11,16 @@
 #include "auvest/models/piecewise_acceleration.hpp"
 #include "auvest/models/range_bearing.hpp"
 #include "auvest/models/slave_motion.hpp"
-#include "simulation/slat.hpp"
 #include "auvest/slat/dead_reckoning.hpp"
 #include "auvest/slat/ekf_slat.hpp"
 #include "auvest/slat/outage.hpp"
+#include "simulation/slat.hpp"
 
 namespace {
 
 using auvest::Belief;
+using auvest::Echo;
 using auvest::Matrix;
-using auvest::Sighting;
 using auvest::SlatScenario;
 using auvest::Status;
 using auvest::Vector;
@@ -43,7 +43,7 @@ Belief<Scalar, 6> master_belief(double x, double y) {
 TEST_CASE_TEMPLATE("EKF-SLAT: with a slave that is known it is the EKF of the master, bit for bit",
                    Scalar, float, double) {
   typename Compass<Scalar>::Params still;
-  still.sigma_speed_mps = still.sigma_heading_rad = Scalar(0);
+  still.sigma_speed_m_s = still.sigma_heading_rad = Scalar(0);
   auvest::EkfSlat<Compass<Scalar>, Master<Scalar>, 1> slat((Compass<Scalar>(still)),
                                                            Master<Scalar>());
   Random random(1);
@@ -67,7 +67,7 @@ TEST_CASE_TEMPLATE("EKF-SLAT: with a slave that is known it is the EKF of the ma
     station.near_field = Scalar(0);
     station.station_x_m = slat.slave().x(0);
     station.station_y_m = slat.slave().x(1);
-    Sighting<Scalar> seen;
+    Echo<Scalar> seen;
     seen.master = 0;
     seen.z << Scalar(200 + random.normal<double>()), Scalar(0.4 + 0.05 * random.normal<double>());
     REQUIRE(slat.update(&seen, 1, auvest::Sonar<Scalar>(sonar), random) == Status::kOk);
@@ -126,7 +126,7 @@ void check_textbook(const Motion& motion, const Belief<double, Motion::kStates>&
     P = (phi * P * phi.transpose() + q).eval();
 
     const int seen_master = (k / 3) % 2;
-    Sighting<double> seen;
+    Echo<double> seen;
     seen.master = seen_master;
     const int at = pose + 6 * seen_master;
     auvest::Sonar<double>::View<double, pose> view;
@@ -177,10 +177,10 @@ struct Consistency {
   /// The filter believes in Q and R times the given factors.
   Consistency(double q_factor, double r_factor) {
     SlatScenario scenario;
-    scenario.sigma_speed_mps = 0.3;
+    scenario.sigma_speed_m_s = 0.3;
     scenario.sigma_heading_rad = 0.03;
     Compass<double>::Params motion;
-    motion.sigma_speed_mps = scenario.sigma_speed_mps * std::sqrt(q_factor);
+    motion.sigma_speed_m_s = scenario.sigma_speed_m_s * std::sqrt(q_factor);
     motion.sigma_heading_rad = scenario.sigma_heading_rad * std::sqrt(q_factor);
     auvest::Sonar<double>::Params sonar;
     sonar.sigma_range_m = scenario.sigma_range_m * std::sqrt(r_factor);
@@ -237,7 +237,7 @@ TEST_CASE("EKF-SLAT: a result that would not be finite is refused, with all echo
   REQUIRE(slat.reset(start, random) == Status::kOk);
   REQUIRE(slat.add_master(master_belief<float>(200, 100)) == Status::kOk);
   REQUIRE(slat.add_master(master_belief<float>(1e25, 0)) == Status::kOk);  // its range overflows
-  Sighting<float> seen[2];
+  Echo<float> seen[2];
   seen[0].master = 0;
   seen[0].z << 225, -2.7f;
   seen[1].master = 1;
@@ -311,7 +311,7 @@ TEST_CASE("outage: starts from the last shared state, hands over when communicat
   Random random(3);
   const Vector<double, 2> u(5, 0.2);
   const auvest::Sonar<double> sonar;
-  Sighting<double> seen;
+  Echo<double> seen;
   seen.master = 0;
   seen.z << 220, -2;
   CHECK(outage.predict(1, u, random) == Status::kNotInitialised);

@@ -13,7 +13,7 @@
 namespace {
 
 using namespace slat_test;
-using auvest::Sighting;
+using auvest::Echo;
 using auvest::SlatScenario;
 using auvest::Status;
 using auvest::math::Random;
@@ -169,7 +169,7 @@ struct Near : Gated<Filter> {
   }
 
   Status step(float range, float bearing) {
-    Sighting<float> seen;
+    Echo<float> seen;
     seen.master = 0;
     seen.z << range, bearing;
     REQUIRE(this->filter.predict(1, auvest::Vector<float, 2>(5, 0), random) == Status::kOk);
@@ -209,7 +209,7 @@ TEST_CASE_TEMPLATE("robustness: echoes that are no numbers leave no trace", Filt
     REQUIRE(clean.step(300, -1.57f) == Status::kOk);
     REQUIRE(dirty.step(300, -1.57f) == Status::kOk);
     const float bad[4][2] = {{nan, -1.57f}, {300, nan}, {infinity, -1.57f}, {300, -infinity}};
-    Sighting<float> seen;
+    Echo<float> seen;
     seen.master = 0;
     seen.z << bad[k % 4][0], bad[k % 4][1];
     REQUIRE(dirty.filter.update(&seen, 1, auvest::Sonar<float>(), dirty.random) ==

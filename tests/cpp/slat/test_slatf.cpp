@@ -29,7 +29,7 @@ void check_equals_ekf() {
   using Scalar = typename Filter::Scalar;
   using Process = typename Filter::Master;
   typename Filter::Motion::Params still;
-  still.sigma_speed_mps = still.sigma_heading_rad = Scalar(0);
+  still.sigma_speed_m_s = still.sigma_heading_rad = Scalar(0);
   Owner<Filter> owner((typename Filter::Motion(still)), Process(), 1);
   Filter& slatf = owner.filter;
   Random random(51);
@@ -56,7 +56,7 @@ void check_equals_ekf() {
     REQUIRE(ekf.predict(Scalar(1)) == Status::kOk);
     if (k % 2 == 0) continue;
     const auto slave = slatf.slave().x;
-    Sighting<Scalar> seen;
+    Echo<Scalar> seen;
     seen.master = 0;
     seen.z(0) = Scalar(300 - 0.5 * k + random.normal<double>());
     seen.z(1) = Scalar(1.5 - 0.004 * k + 0.06 * random.normal<double>());
@@ -153,7 +153,7 @@ void check_independence() {
     REQUIRE(filter.predict(Scalar(1), Vector<Scalar, 2>(Scalar(5), Scalar(0.1)), random) ==
             Status::kOk);
     const std::vector<Scalar> before = owner.storage;
-    Sighting<Scalar> seen;
+    Echo<Scalar> seen;
     seen.master = trial % masters;
     seen.z << Scalar(200 + random.normal<double>()), Scalar(-2 + 0.1 * random.normal<double>());
     REQUIRE(filter.update(&seen, 1, auvest::Sonar<Scalar>(), random) == Status::kOk);
@@ -192,7 +192,7 @@ TEST_CASE("SLATF 2.0: two masters at once weigh what the joint Gaussian gives, i
   Eigen::Matrix<double, 4, 1> innovation;
   Eigen::Matrix<double, 4, 4> s = Eigen::Matrix<double, 4, 4>::Zero();
   Eigen::Matrix<double, 4, 2> by_slave;
-  Sighting<double> seen[2];
+  Echo<double> seen[2];
   const Belief<double, 6>* masters[2] = {&first, &second};
   for (int n = 0; n < 2; ++n) {
     Belief<double, 6> ahead = *masters[n];
@@ -220,7 +220,7 @@ TEST_CASE("SLATF 2.0: two masters at once weigh what the joint Gaussian gives, i
     REQUIRE(owner.filter.add_master(first) == Status::kOk);
     REQUIRE(owner.filter.add_master(second) == Status::kOk);
     REQUIRE(owner.filter.predict(problem.dt, problem.reading, random) == Status::kOk);
-    Sighting<double> order[2] = {seen[swapped ? 1 : 0], seen[swapped ? 0 : 1]};
+    Echo<double> order[2] = {seen[swapped ? 1 : 0], seen[swapped ? 0 : 1]};
     REQUIRE(owner.filter.update(order, 2, problem.sonar, random) == Status::kOk);
     CHECK(std::fabs(owner.filter.log_likelihood() - expected) < 0.005);
   }
@@ -238,7 +238,7 @@ TEST_CASE_TEMPLATE("SLATF: refused calls leave all bits", Filter,
   Filter& filter = owner.filter;
   Random random(81);
   const auvest::Sonar<float> sonar;
-  Sighting<float> seen[2];
+  Echo<float> seen[2];
   seen[0].master = 0;
   seen[1].master = 1;
   seen[0].z << 200, -2;
@@ -287,7 +287,7 @@ TEST_CASE_TEMPLATE("SLATF: refused calls leave all bits", Filter,
   wrong = seen[0];
   wrong.master = 2;
   CHECK(filter.update(&wrong, 1, sonar, random) == Status::kBadParameter);
-  const Sighting<float> twice[2] = {seen[0], seen[0]};
+  const Echo<float> twice[2] = {seen[0], seen[0]};
   CHECK(filter.update(twice, 2, sonar, random) == Status::kBadParameter);
   CHECK(owner.storage == before);
 }
@@ -309,14 +309,14 @@ TEST_CASE("SLATF: parameters out of their range are refused, those at its ends a
   for (const float bad : {-0.1f, std::nanf(""), INFINITY}) {
     CHECK(status(&Params::resample_below, bad) == Status::kBadParameter);
     CHECK(status(&Params::gate, bad) == Status::kBadParameter);
-    CHECK(status(&Params::birth_velocity_mps, bad) == Status::kBadParameter);
-    CHECK(status(&Params::birth_acceleration_mps2, bad) == Status::kBadParameter);
+    CHECK(status(&Params::birth_velocity_m_s, bad) == Status::kBadParameter);
+    CHECK(status(&Params::birth_acceleration_m_s2, bad) == Status::kBadParameter);
   }
   for (const float end : {0.0f, 1.0f}) CHECK(status(&Params::resample_below, end) == Status::kOk);
   CHECK(status(&Params::resample_below, 1.001f) == Status::kBadParameter);
   CHECK(status(&Params::gate, 0) == Status::kOk);
-  CHECK(status(&Params::birth_velocity_mps, 0) == Status::kOk);
-  CHECK(status(&Params::birth_acceleration_mps2, 0) == Status::kBadParameter);
+  CHECK(status(&Params::birth_velocity_m_s, 0) == Status::kOk);
+  CHECK(status(&Params::birth_acceleration_m_s2, 0) == Status::kBadParameter);
 }
 
 TEST_CASE("SLATF: planned velocity changes move the master as Eq. (4) says") {
@@ -376,7 +376,7 @@ TEST_CASE("SLATF: the same seed gives the same bits, the mean of the heading cro
     REQUIRE(owner->filter.reset(start, 100, random) == Status::kOk);
     REQUIRE(owner->filter.add_master(master_belief<float>(100, 200, 0, 0, 1)) == Status::kOk);
     REQUIRE(owner->filter.predict(1, Vector<float, 2>(1, 0.1f), random) == Status::kOk);
-    Sighting<float> seen;
+    Echo<float> seen;
     seen.master = 0;
     seen.z << 224, 1.1f - 3.2f;
     auvest::Sonar<float>::Params sonar;
@@ -395,7 +395,7 @@ TEST_CASE("SLATF: the same seed gives the same bits, the mean of the heading cro
 /// Echoes of the masters as the filter believes them, with noise; in any order, known or not.
 template <class Filter>
 void hear(const Filter& filter, const auvest::Sonar<float>& sonar, bool known, Random& noise,
-          Sighting<float>* seen) {
+          Echo<float>* seen) {
   for (int n = 0; n < filter.masters(); ++n) {
     const auto slave = filter.slave().x;
     const auto master = filter.master(n).x;
@@ -403,7 +403,7 @@ void hear(const Filter& filter, const auvest::Sonar<float>& sonar, bool known, R
     const float dy = slave(1) - master(1);
     float a, b;
     noise.normal_pair(a, b);
-    Sighting<float>& echo = seen[filter.masters() - 1 - n];
+    Echo<float>& echo = seen[filter.masters() - 1 - n];
     echo.master = known ? n : auvest::kUnknownMaster;
     echo.z(0) = std::sqrt(dx * dx + dy * dy) + sonar.params.sigma_range_m * a;
     echo.z(1) = auvest::math::atan2(dy, dx) + sonar.params.sigma_bearing_rad * b;
@@ -430,12 +430,12 @@ void run_pair(bool stepwise, bool known, Owner<Filter>& a, Owner<Filter>& b) {
   }
   for (int k = 0; k < 30; ++k) {
     const Vector<float, 2> u(2, 0.1f * static_cast<float>(k));
-    Sighting<float> seen[3];
+    Echo<float> seen[3];
     REQUIRE(a.filter.predict(1, u, random_a) == Status::kOk);
     hear(a.filter, sonar, true, noise, seen);
     const int count = k % 4;
     REQUIRE(a.filter.update(seen, count, sonar, random_a) == Status::kOk);
-    for (Sighting<float>& echo : seen) {
+    for (Echo<float>& echo : seen) {
       if (!known) echo.master = auvest::kUnknownMaster;
     }
     if (stepwise) {
@@ -464,7 +464,7 @@ TEST_CASE_TEMPLATE("SLATF: step() has the bits of predict() and update()", Filte
   CHECK(a.storage == b.storage);
   CHECK(a.filter.log_likelihood() == b.filter.log_likelihood());
   Random random(1);
-  Sighting<float> seen[1];
+  Echo<float> seen[1];
   seen[0].master = 0;
   seen[0].z << std::nanf(""), 0;
   const Vector<float, 2> u(2, 0);
@@ -484,9 +484,15 @@ TEST_CASE_TEMPLATE("SLATF: unknown echoes of masters far apart do what known one
   CHECK(a.storage == b.storage);
 }
 
+/// The particles of a filter, to be put where a test wants them.
+template <class Filter>
+typename Filter::Set& particles_of(Filter& filter) {
+  return const_cast<typename Filter::Set&>(filter.set());
+}
+
 TEST_CASE("SLATF 1.0: a particle whose correction overflows weighs nothing, the others as before") {
   using Filter = auvest::Slatf1<Compass<float>, Master<float>, 1>;
-  typename Filter::Params params;
+  Filter::Params params;
   params.resample_below = 0;
   const int particles = 5;
   const auvest::Sonar<float> sonar;
@@ -502,18 +508,20 @@ TEST_CASE("SLATF 1.0: a particle whose correction overflows weighs nothing, the 
     REQUIRE(filter.reset(start, random) == Status::kOk);
     REQUIRE(filter.add_master(master_belief<float>(100, 150, 2, 1, 1)) == Status::kOk);
     if (overflows == 1) {
-      // Its velocity is at the end of the format, and the echo that moves the position moves it on.
+      // Its velocity is at the ends of the format, and the echo that moves x moves one part beyond.
       lost = static_cast<int>(std::max_element(weights[0].begin(), weights[0].end()) -
                               weights[0].begin());
-      *filter.set().at(lost, Filter::kMasterField + 2) = std::numeric_limits<float>::max();
-      *filter.set().at(lost, Filter::kMasterField + 6 + 3) = 1e36f;  // P(2, 0)
+      *particles_of(filter).at(lost, Filter::kMasterField + 2) = std::numeric_limits<float>::max();
+      *particles_of(filter).at(lost, Filter::kMasterField + 3) = std::numeric_limits<float>::lowest();
+      *particles_of(filter).at(lost, Filter::kMasterField + 6 + 3) = 1e36f;  // P(2, 0)
+      *particles_of(filter).at(lost, Filter::kMasterField + 6 + 6) = 1e36f;  // P(3, 0)
     }
-    Sighting<float> seen;
+    Echo<float> seen;
     seen.master = 0;
-    seen.z << 184, -2.16f;
+    seen.z << 181, -2.16f;
     REQUIRE(filter.update(&seen, 1, sonar, random) == Status::kOk);
     for (int i = 0; i < particles; ++i) {
-      weights[overflows].push_back(auvest::weight_of(filter.set().log_weight(i)));
+      weights[overflows].push_back(auvest::weight_of(filter.set().log_weights()[i]));
     }
     CHECK(std::isfinite(filter.log_likelihood()));
     if (overflows == 1) {  // and keeps what it believed
@@ -536,12 +544,12 @@ TEST_CASE("SLATF: a master is born where the echo comes from, as far as the slav
   using Second = auvest::Slatf2<auvest::UnicycleMotion<double>, Master<double>, 1>;
   auvest::SlatfParams<double> params;
   params.gate = 16;
-  params.birth_velocity_mps = 2;
+  params.birth_velocity_m_s = 2;
   auvest::Sonar<double>::Params device;
   device.bearing = auvest::Bearing::kFromHeading;
   device.sigma_range_m = 0.5;
   device.sigma_bearing_rad = 0.02;
-  Sighting<double> seen;
+  Echo<double> seen;
   seen.master = auvest::kUnknownMaster;
   seen.z << 100, 0.5;
   Belief<double, 3> start;
@@ -572,7 +580,7 @@ TEST_CASE_TEMPLATE("SLATF: a master is born from an echo that nobody expects, on
                    auvest::Slatf2<Compass<double>, Master<double>, 2>) {
   typename Filter::Params params;
   params.gate = 16;
-  params.birth_velocity_mps = 2;
+  params.birth_velocity_m_s = 2;
   Owner<Filter> owner((Compass<double>()), Master<double>(), 200, params);
   Filter& filter = owner.filter;
   Random random(88);
@@ -589,7 +597,7 @@ TEST_CASE_TEMPLATE("SLATF: a master is born from an echo that nobody expects, on
     const double y = 60 - 0.5 * k;
     double a, b;
     noise.normal_pair(a, b);
-    Sighting<double> seen;
+    Echo<double> seen;
     seen.master = auvest::kUnknownMaster;
     seen.z << std::hypot(x, y) + a, auvest::math::wrap(std::atan2(-y, -x) + 0.06 * b);
     REQUIRE(filter.update(&seen, 1, sonar, random) == Status::kOk);
@@ -610,7 +618,7 @@ TEST_CASE_TEMPLATE("SLATF: a master is born from an echo that nobody expects, on
   REQUIRE(stepwise.filter.reset(start, by_step) == Status::kOk);
   REQUIRE(in_two.filter.reset(start, by_two) == Status::kOk);
   for (int k = 0; k < 4; ++k) {
-    Sighting<double> seen;
+    Echo<double> seen;
     seen.master = auvest::kUnknownMaster;
     seen.z << 100 + k, -2.4;
     const Vector<double, 2> u(1, 0.3);

@@ -52,7 +52,7 @@ void check_equals_ekf(auvest::Bearing bearing) {
   for (int k = 0; k < 60; ++k) {
     const Vector<Scalar, 2> u(Scalar(2), Scalar(0.01 * k));
     const Vector<Scalar, 2> changes[2] = {{Scalar(0.01), Scalar(0)}, {Scalar(0), Scalar(-0.02)}};
-    Sighting<Scalar> seen[2];
+    Echo<Scalar> seen[2];
     for (int n = 0; n < 2; ++n) {
       Vector<Scalar, Filter::kPose> pose = ekf.slave().x;
       const auto master = ekf.master(1 - n).x;
@@ -196,7 +196,7 @@ TEST_CASE("SlatfJoint: where the sonar is linear the mixture is the Kalman filte
   // resampling over 12 pings of two masters must leave the moments of one Gaussian.
   using Filter = Joint<double, 2>;
   Compass<double>::Params motion;
-  motion.sigma_speed_mps = 0.5;
+  motion.sigma_speed_m_s = 0.5;
   motion.sigma_heading_rad = 0.1;
   auvest::Sonar<double>::Params sonar_params;
   sonar_params.sigma_range_m = 2;
@@ -226,7 +226,7 @@ TEST_CASE("SlatfJoint: where the sonar is linear the mixture is the Kalman filte
       const Vector<double, 2> u(3, 0.2 * k);
       REQUIRE(owner.filter.predict(2, u, random) == Status::kOk);
       REQUIRE(ekf.predict(2, u, random) == Status::kOk);
-      Sighting<double> seen[2];
+      Echo<double> seen[2];
       for (int n = 0; n < 2; ++n) {
         const Vector<double, 2> d = ekf.slave().x - ekf.master(n).x.head<2>();
         seen[n].master = n;
@@ -266,7 +266,7 @@ TEST_CASE("SlatfJoint: where the sonar is linear the mixture is the Kalman filte
 struct Started {
   Owner<Joint<float, 2>> owner;
   Random random;
-  Sighting<float> seen[2];
+  Echo<float> seen[2];
   Vector<float, 2> u;
 
   explicit Started(const Joint<float, 2>::Params& params = Joint<float, 2>::Params())
@@ -361,7 +361,7 @@ TEST_CASE("SlatfJoint: unknown echoes of masters far apart do what known ones do
   Started known;
   Started unknown;
   const auvest::Sonar<float> sonar;
-  for (Sighting<float>& echo : unknown.seen) echo.master = auvest::kUnknownMaster;
+  for (Echo<float>& echo : unknown.seen) echo.master = auvest::kUnknownMaster;
   for (int k = 0; k < 10; ++k) {
     for (Started* each : {&known, &unknown}) {
       REQUIRE(each->owner.filter.predict(0.1f, each->u, each->random) == Status::kOk);

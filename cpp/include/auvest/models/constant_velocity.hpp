@@ -20,7 +20,7 @@ struct ConstantVelocity : ProcessModel<ConstantVelocity<Scalar_>, Scalar_, 6> {
 
   struct Params {
     Scalar velocity = Scalar(1e-4);                ///< q_v [m^2/s^3]
-    Scalar sigma_acceleration_mps2 = Scalar(0.1);  ///< sigma_a
+    Scalar sigma_acceleration_m_s2 = Scalar(0.1);  ///< sigma_a
   };
 
   Params params;
@@ -68,7 +68,7 @@ struct ConstantVelocity : ProcessModel<ConstantVelocity<Scalar_>, Scalar_, 6> {
 
   Status check() const {
     return math::is_nonnegative(params.velocity) &&
-                   math::is_nonnegative(params.sigma_acceleration_mps2)
+                   math::is_nonnegative(params.sigma_acceleration_m_s2)
                ? Status::kOk
                : Status::kBadParameter;
   }
@@ -94,7 +94,7 @@ struct ConstantVelocity : ProcessModel<ConstantVelocity<Scalar_>, Scalar_, 6> {
     const Scalar fresh = Scalar(1) - memory(dt);
     AUVEST_UNROLL
     for (int i = 4; i < 6; ++i) {
-      p(i, i) = p(i, i) + fresh * (params.sigma_acceleration_mps2 * params.sigma_acceleration_mps2);
+      p(i, i) = p(i, i) + fresh * (params.sigma_acceleration_m_s2 * params.sigma_acceleration_m_s2);
     }
   }
 };

@@ -35,7 +35,7 @@ struct CoordinatedTurn : ProcessModel<CoordinatedTurn<Scalar_>, Scalar_, 6> {
 
   struct Params {
     AccelerationNoise<Scalar> noise;
-    Scalar slow_mps = Scalar(0.01);  ///< v_0, > 0
+    Scalar slow_m_s = Scalar(0.01);  ///< v_0, > 0
   };
 
   Params params;
@@ -63,7 +63,7 @@ struct CoordinatedTurn : ProcessModel<CoordinatedTurn<Scalar_>, Scalar_, 6> {
 
   Status check() const {
     const Status noise = ExactAcceleration<Scalar>(params.noise).check();
-    return math::is_positive(params.slow_mps) ? noise : Status::kBadParameter;
+    return math::is_positive(params.slow_m_s) ? noise : Status::kBadParameter;
   }
 
  private:
@@ -79,7 +79,7 @@ struct CoordinatedTurn : ProcessModel<CoordinatedTurn<Scalar_>, Scalar_, 6> {
       using math::select;
       using math::sincos;
       const Value t(dt);
-      inverse = Value(1) / (x(2) * x(2) + x(3) * x(3) + Value(params.slow_mps * params.slow_mps));
+      inverse = Value(1) / (x(2) * x(2) + x(3) * x(3) + Value(params.slow_m_s * params.slow_m_s));
       omega = (x(2) * x(5) - x(3) * x(4)) * inverse;
       const Value u = omega * omega;
       const Value half = Value(Scalar(0.5)) * (omega * t);

@@ -22,7 +22,7 @@ struct PiecewiseAcceleration : ProcessModel<PiecewiseAcceleration<Scalar_>, Scal
   static constexpr bool kLinear = true;
 
   struct Params {
-    Scalar acceleration_mps2 = Scalar(1e-4);  ///< q, standard deviation of w per step
+    Scalar acceleration_m_s2 = Scalar(1e-4);  ///< q, standard deviation of w per step
   };
 
   Params params;
@@ -49,7 +49,7 @@ struct PiecewiseAcceleration : ProcessModel<PiecewiseAcceleration<Scalar_>, Scal
   }
 
   Status check() const {
-    return math::is_nonnegative(params.acceleration_mps2) ? Status::kOk : Status::kBadParameter;
+    return math::is_nonnegative(params.acceleration_m_s2) ? Status::kOk : Status::kBadParameter;
   }
 
  private:
@@ -61,8 +61,8 @@ struct PiecewiseAcceleration : ProcessModel<PiecewiseAcceleration<Scalar_>, Scal
 
   template <class Value>
   AUVEST_INLINE void add_noise(Matrix<Value, 6, 6>& p, Scalar dt) const {
-    const Scalar g[3] = {Scalar(0.5) * dt * dt * params.acceleration_mps2,
-                         dt * params.acceleration_mps2, params.acceleration_mps2};
+    const Scalar g[3] = {Scalar(0.5) * dt * dt * params.acceleration_m_s2,
+                         dt * params.acceleration_m_s2, params.acceleration_m_s2};
     AUVEST_UNROLL
     for (int axis = 0; axis < 2; ++axis) {
       AUVEST_UNROLL

@@ -44,7 +44,7 @@ struct CompassMotion {
   using Covariance = Matrix<Scalar, 2, 2>;
 
   struct Params {
-    Scalar sigma_speed_mps = Scalar(2);      ///< of one speed reading, section 7
+    Scalar sigma_speed_m_s = Scalar(2);      ///< of one speed reading, section 7
     Scalar sigma_heading_rad = Scalar(0.3);  ///< of one compass reading, section 7
     bool compensate_bias = true;             ///< see above; the paper: false
   };
@@ -76,7 +76,7 @@ struct CompassMotion {
     s.dx = reach * s.speed * cosine;
     s.dy = reach * s.speed * sine;
     // G = [c, -V s; s, V c] reach: `along` and `across` are its columns' lengths.
-    const Scalar along = reach * params.sigma_speed_mps;
+    const Scalar along = reach * params.sigma_speed_m_s;
     const Scalar across = reach * s.speed * params.sigma_heading_rad;
     s.xx = along * along * (cosine * cosine) + across * across * (sine * sine);
     s.yy = along * along * (sine * sine) + across * across * (cosine * cosine);
@@ -89,7 +89,7 @@ struct CompassMotion {
   AUVEST_INLINE void sample(const Step& s, const Value& a, const Value& b,
                             Vector<Value, 2>& pose) const {
     using math::sincos;
-    const Value distance = s.reach * (s.speed + params.sigma_speed_mps * a);
+    const Value distance = s.reach * (s.speed + params.sigma_speed_m_s * a);
     Value sine, cosine;
     sincos(Value(s.heading + params.sigma_heading_rad * b), sine, cosine);
     // [SLATF 10], by [SLATF 2]
@@ -125,7 +125,7 @@ struct CompassMotion {
   }
 
   Status check() const {
-    const bool valid = math::is_nonnegative(params.sigma_speed_mps) &&
+    const bool valid = math::is_nonnegative(params.sigma_speed_m_s) &&
                        math::within(params.sigma_heading_rad, Scalar(0), Scalar(3));
     return valid ? Status::kOk : Status::kBadParameter;
   }
@@ -140,8 +140,8 @@ struct UnicycleMotion {
   using Covariance = Matrix<Scalar, 3, 3>;
 
   struct Params {
-    Scalar sigma_speed_mps = Scalar(0.1);        ///< of one speed reading
-    Scalar sigma_yaw_rate_radps = Scalar(0.01);  ///< of one yaw rate reading
+    Scalar sigma_speed_m_s = Scalar(0.1);        ///< of one speed reading
+    Scalar sigma_yaw_rate_rad_s = Scalar(0.01);  ///< of one yaw rate reading
   };
 
   Params params;
@@ -165,13 +165,13 @@ struct UnicycleMotion {
                             Vector<Value, 3>& pose) const {
     using math::sincos;
     using math::wrap;
-    const Value distance = s.dt * (s.speed + params.sigma_speed_mps * a);
+    const Value distance = s.dt * (s.speed + params.sigma_speed_m_s * a);
     Value sine, cosine;
     sincos(pose(2), sine, cosine);
     // [SLATF 10]
     pose(0) = pose(0) + distance * cosine;
     pose(1) = pose(1) + distance * sine;
-    pose(2) = wrap(Value(pose(2) + s.dt * (s.yaw_rate + params.sigma_yaw_rate_radps * b)));
+    pose(2) = wrap(Value(pose(2) + s.dt * (s.yaw_rate + params.sigma_yaw_rate_rad_s * b)));
   }
 
   /// Phi = I + [0 0 p; 0 0 q; 0 0 0] with p = -dt V sin, q = dt V cos; G has the columns
@@ -194,8 +194,8 @@ struct UnicycleMotion {
     c(1, 1) = c(1, 1) + q * (c(2, 1) + yh);
     c(2, 0) = xh;
     c(2, 1) = yh;
-    const Scalar along = s.dt * params.sigma_speed_mps;
-    const Scalar turn = s.dt * params.sigma_yaw_rate_radps;
+    const Scalar along = s.dt * params.sigma_speed_m_s;
+    const Scalar turn = s.dt * params.sigma_yaw_rate_rad_s;
     const Value gx = along * cosine;
     const Value gy = along * sine;
     c(0, 0) = c(0, 0) + gx * gx;
@@ -223,8 +223,8 @@ struct UnicycleMotion {
   Covariance noise(const Step& s, const State& pose) const {
     Scalar sine, cosine;
     math::sincos(pose(2), sine, cosine);
-    const Scalar along = s.dt * params.sigma_speed_mps;
-    const Scalar turn = s.dt * params.sigma_yaw_rate_radps;
+    const Scalar along = s.dt * params.sigma_speed_m_s;
+    const Scalar turn = s.dt * params.sigma_yaw_rate_rad_s;
     Covariance q;
     q(0, 0) = along * cosine * (along * cosine);
     q(0, 1) = q(1, 0) = along * cosine * (along * sine);
@@ -235,8 +235,8 @@ struct UnicycleMotion {
   }
 
   Status check() const {
-    const bool valid = math::is_nonnegative(params.sigma_speed_mps) &&
-                       math::is_nonnegative(params.sigma_yaw_rate_radps);
+    const bool valid = math::is_nonnegative(params.sigma_speed_m_s) &&
+                       math::is_nonnegative(params.sigma_yaw_rate_rad_s);
     return valid ? Status::kOk : Status::kBadParameter;
   }
 };

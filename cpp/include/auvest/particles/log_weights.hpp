@@ -34,7 +34,7 @@ struct WeightSummary {
 /// [SLATF 32] with logarithms: the largest weight is taken out before the exponential, so at least
 /// one term of the sum is 1, however far below the format's range all weights lie.
 template <class Lanes, class Set>
-inline WeightSummary<typename Lanes::Scalar> normalise(const Set& set) {
+inline WeightSummary<typename Lanes::Scalar> normalise(Set& set) {
   using math::larger;
   using math::log;
   using Scalar = typename Lanes::Scalar;
@@ -75,7 +75,7 @@ inline WeightSummary<typename Lanes::Scalar> normalise(const Set& set) {
 
 /// All n particles weigh the same; those that fill the last block weigh nothing.
 template <class Set>
-inline void equal_weights(const Set& set) {
+inline void equal_weights(Set& set) {
   using math::log;
   using Scalar = typename Set::Scalar;
   const Scalar log_weight = -log(Scalar(set.size()));

@@ -82,6 +82,27 @@ AUVEST_INLINE void store_belief_where(const math::Mask<Value>& where, typename L
   }
 }
 
+/// The means of K fields, each about the first particle's number, in one pass over no other fields.
+template <class Lanes, int K, class Set>
+void mean_fields(const Set& set, const int (&fields)[K], typename Set::Scalar (&mean)[K]) {
+  using Scalar = typename Set::Scalar;
+  using Value = typename Lanes::Value;
+  constexpr int kAhead = 16;  // blocks, read so sparsely that no cache foresees it
+  Scalar origin[K];
+  for (int k = 0; k < K; ++k) origin[k] = *set.at(0, fields[k]);
+  weighted_means<Lanes>(
+      set,
+      [&](int i, Value(&q)[K]) {
+        for (int k = 0; k < K; ++k) {
+          const Scalar* number = set.at(i, fields[k]);
+          q[k] = Lanes::load(number) - Value(origin[k]);
+          Lanes::prefetch(number + kAhead * Set::kFields * kBlock);
+        }
+      },
+      mean);
+  for (int k = 0; k < K; ++k) mean[k] = origin[k] + mean[k];
+}
+
 /// Calls f(at, k, l) for `count` numbers of the lower triangle of an N x N matrix from number
 /// `first` on.
 template <int N, class Function>

@@ -155,7 +155,7 @@ struct ResidualResampling {
 /// Copies each particle over the dead as often as its count says. A particle that goes on stays
 /// where it is. In: the places of the log weights hold the counts. Out: equal weights.
 template <class Set>
-inline void redistribute(const Set& set) {
+inline void redistribute(Set& set) {
   using Scalar = typename Set::Scalar;
   Scalar* counts = set.log_weights();
   int dead = 0;
@@ -172,7 +172,7 @@ inline void redistribute(const Set& set) {
 
 /// Resamples the normalised set by the policy.
 template <class Lanes, class Policy, class Set>
-inline void resample(const Policy& policy, const Set& set, math::Random& random) {
+inline void resample(const Policy& policy, Set& set, math::Random& random) {
   typename Set::Scalar* weights = set.log_weights();
   for (int i = 0; i < set.size(); i += Lanes::kWidth) {
     Lanes::store(weights + i, weight_of(Lanes::load(weights + i)));

@@ -40,8 +40,8 @@ struct Score {
   Value log_density;
 };
 
-/// NIS and density of an echo z of a master at `place`: by S of [SLATF 23], or where the pose has a
-/// covariance (`uncertain`, 2.0) by L of [SLATF 65].
+/// NIS and density of an echo z of a master at `place`: by S of [SLATF 23], or where the pose has
+/// a covariance (`uncertain`, 2.0) by L of [SLATF 65].
 template <class Scalar, class Value, int Pose>
 AUVEST_INLINE Score<Value> score(const Sonar<Scalar>& sonar, const Vector<Scalar, 2>& z,
                                  const Place<Value>& place, const Belief<Value, Pose>& pose,

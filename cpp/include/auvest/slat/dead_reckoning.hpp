@@ -4,48 +4,50 @@
 
 #include "auvest/math/linear_algebra.hpp"
 #include "auvest/math/random.hpp"
-#include "auvest/slat/sighting.hpp"
+#include "auvest/slat/echo.hpp"
+#include "auvest/slat/slat_filter.hpp"
 #include "auvest/status.hpp"
 #include "auvest/types.hpp"
 
 namespace auvest {
 
 template <class Motion_>
-class DeadReckoning {
+class DeadReckoning : public SlatFilter<Motion_, 0> {
  public:
+  using Frame = SlatFilter<Motion_, 0>;
   using Motion = Motion_;
-  using Scalar = typename Motion::Scalar;
-  using Control = typename Motion::Control;
-  static constexpr int kPose = Motion::kStates;
-  using SlaveBelief = Belief<Scalar, kPose>;
-  using MasterBelief = Belief<Scalar, 6>;
-  using VelocityChange = Vector<Scalar, 2>;
+  using typename Frame::Control;
+  using typename Frame::MasterBelief;
+  using typename Frame::Scalar;
+  using typename Frame::SlaveBelief;
+  using typename Frame::VelocityChange;
 
-  explicit DeadReckoning(const Motion& motion) : motion_(motion), initialised_(false) {
+  explicit DeadReckoning(const Motion& motion) : motion_(motion) {
     math::set_zero(pose_.x);
     math::set_zero(pose_.P);
   }
 
   Status reset(const SlaveBelief& pose, math::Random&) {
     if (motion_.check() != Status::kOk) return Status::kBadParameter;
-    if (!math::all_finite(pose.x) || !math::lower_finite(pose.P)) return Status::kNotFinite;
+    const Status status = Frame::check_slave(pose);
+    if (status != Status::kOk) return status;
+    this->start();
     pose_ = pose;
-    initialised_ = true;
     return Status::kOk;
   }
 
+  /// Of no use to it, so none is refused.
   Status add_master(const MasterBelief&) { return Status::kOk; }
 
   Status predict(Scalar dt, const Control& u, math::Random&, const VelocityChange* = nullptr) {
-    if (!initialised_) return Status::kNotInitialised;
-    if (!math::is_finite(dt) || !math::all_finite(u)) return Status::kNotFinite;
-    if (dt < Scalar(0)) return Status::kTimeBackwards;
+    const Status status = this->check_prediction(dt, u, nullptr);
+    if (status != Status::kOk) return status;
     motion_.propagate(motion_.step(u, dt), pose_);
     return Status::kOk;
   }
 
-  Status update(const Sighting<Scalar>*, int, const Sonar<Scalar>&, math::Random&) {
-    return initialised_ ? Status::kOk : Status::kNotInitialised;
+  Status update(const Echo<Scalar>*, int, const Sonar<Scalar>&, math::Random&) {
+    return this->initialised_ ? Status::kOk : Status::kNotInitialised;
   }
 
   SlaveBelief slave() const {
@@ -54,10 +56,16 @@ class DeadReckoning {
     return pose;
   }
 
+  /// As SlatFilter::visit_state.
+  template <class Self, class Visit>
+  static void visit_state(Self& self, Visit& visit) {
+    Frame::visit_state(self, visit);
+    visit(self.pose_);
+  }
+
  private:
   Motion motion_;
   SlaveBelief pose_;
-  bool initialised_;
 };
 
 }  // namespace auvest

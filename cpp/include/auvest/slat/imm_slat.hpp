@@ -22,6 +22,21 @@
 
 namespace auvest {
 
+/// Corrects the belief stored from `at` on by `ekf`, in the lanes of `only` (null: all) where that
+/// is valid; gives that belief and returns the logarithm of the echo's density.
+template <class Lanes, class Value, class Ekf>
+AUVEST_INLINE Value correct_stored(const Ekf& ekf, const math::Mask<Value>* only,
+                                   typename Lanes::Scalar* at, Belief<Value, 6>& belief) {
+  using math::all;
+  load_belief<Lanes>(at, belief);
+  Value log_density;
+  math::Mask<Value> moved = ekf(belief, log_density);
+  if (only != nullptr) moved = moved && *only;
+  store_belief_where<Lanes>(moved, at, belief);
+  if (!all(moved)) load_belief<Lanes>(at, belief);
+  return log_density;
+}
+
 template <class... Models, class Lanes>
 struct MasterBank<Imm<Models...>, Lanes> {
   using Master = Imm<Models...>;
@@ -121,20 +136,20 @@ constexpr int power(int base, int exponent) {
 }
 
 template <class Motion_, class... Models, int Masters>
-class EkfSlat<Motion_, Imm<Models...>, Masters> {
+class EkfSlat<Motion_, Imm<Models...>, Masters> : public SlatFilter<Motion_, Masters> {
  public:
+  using Frame = SlatFilter<Motion_, Masters>;
   using Motion = Motion_;
   using Master = Imm<Models...>;
   using Model = JointGaussian<Motion, typename Master::Model, Masters>;
-  using Scalar = typename Motion::Scalar;
-  using Control = typename Motion::Control;
   using Params = typename EkfSlat<Motion, typename Master::Model, Masters>::Params;
-  using SlaveBelief = typename Model::SlaveBelief;
-  using MasterBelief = typename Model::MasterBelief;
+  using typename Frame::Control;
+  using typename Frame::MasterBelief;
+  using typename Frame::Scalar;
+  using typename Frame::SlaveBelief;
+  using typename Frame::VelocityChange;
   using BeliefType = typename Model::Joint;
-  using VelocityChange = Vector<Scalar, 2>;
   static constexpr int kPose = Model::kPose;
-  static constexpr int kMasters = Masters;
   static constexpr int kStates = Model::kStates;
   static constexpr int kModes = Master::kModes;
   static constexpr int kHypotheses = power(kModes, Masters);
@@ -154,22 +169,21 @@ class EkfSlat<Motion_, Imm<Models...>, Masters> {
         !math::is_nonnegative(params_.gate)) {
       return Status::kBadParameter;
     }
-    if (!math::all_finite(pose.x) || !math::lower_finite(pose.P)) return Status::kNotFinite;
+    const Status status = Frame::check_slave(pose);
+    if (status != Status::kOk) return status;
+    this->start();
     Model::start(pose, belief_[0]);
     for (int h = 0; h < kHypotheses; ++h) log_weight_(h) = no_log_weight<Scalar>();
     log_weight_(0) = Scalar(0);
     hypotheses_ = 1;
-    masters_ = 0;
-    nis_ = log_likelihood_ = Scalar(0);
+    nis_ = Scalar(0);
     return Status::kOk;
   }
 
   /// Every hypothesis becomes kModes, one per model of the new master, by their shares.
   Status add_master(const MasterBelief& belief) {
-    if (hypotheses_ == 0) return Status::kNotInitialised;
-    if (masters_ == Masters) return Status::kBadParameter;
-    if (!math::all_finite(belief.x) || !math::lower_finite(belief.P)) return Status::kNotFinite;
-    if (!math::is_positive_definite(belief.P)) return Status::kNotPositiveDefinite;
+    const Status status = this->check_master(belief);
+    if (status != Status::kOk) return status;
     for (int h = 0; h < hypotheses_; ++h) {
       Model::put(belief, Model::first_of(masters_), belief_[h]);
     }
@@ -185,10 +199,8 @@ class EkfSlat<Motion_, Imm<Models...>, Masters> {
 
   Status predict(Scalar dt, const Control& u, math::Random&,
                  const VelocityChange* changes = nullptr) {
-    if (hypotheses_ == 0) return Status::kNotInitialised;
-    if (!math::is_finite(dt) || !math::all_finite(u)) return Status::kNotFinite;
-    if (dt < Scalar(0)) return Status::kTimeBackwards;
-    if (!plan_finite(changes, masters_)) return Status::kNotFinite;
+    const Status status = this->check_prediction(dt, u, changes);
+    if (status != Status::kOk) return status;
     for (int n = 0; n < masters_; ++n) mix_models_of(n, master_.stay(dt));
     const typename Motion::Step step = motion_.step(u, dt);
     Model model(motion_, master_.model(0));
@@ -202,10 +214,8 @@ class EkfSlat<Motion_, Imm<Models...>, Masters> {
   /// As EkfSlat without an Imm; whose the echoes of kUnknownMaster are is decided in each
   /// hypothesis. A hypothesis whose belief would not be finite keeps the one it has and weighs
   /// nothing. kOverflow: that is so for all.
-  Status update(const Sighting<Scalar>* sightings, int count, const Sonar<Scalar>& sonar,
-                math::Random&) {
-    if (hypotheses_ == 0) return Status::kNotInitialised;
-    const Status status = check_sightings(sightings, count, masters_, sonar, kPose, false);
+  Status update(const Echo<Scalar>* echoes, int count, const Sonar<Scalar>& sonar, math::Random&) {
+    const Status status = this->check_update(echoes, count, masters_, sonar);
     if (status != Status::kOk || count == 0) return status;
     bool heard = false;
     Scalar nis(0);
@@ -214,7 +224,7 @@ class EkfSlat<Motion_, Imm<Models...>, Masters> {
     Weights log_weight = log_weight_;
     for (int h = 0; h < hypotheses_; ++h) {
       Score<Scalar> score;
-      if (take_in(sightings, count, sonar, belief_[h], score)) {
+      if (correct(echoes, count, sonar, belief_[h], score)) {
         heard = true;
         nis = nis + part(h) * score.nis;
         log_weight(h) = math::larger(no_log_weight<Scalar>(), log_weight(h) + score.log_density);
@@ -223,8 +233,8 @@ class EkfSlat<Motion_, Imm<Models...>, Masters> {
       }
     }
     if (!heard) return Status::kOverflow;
-    log_likelihood_ = log_likelihood_ + normalise(log_weight) -
-                      Scalar(count) * Scalar(1.8378770664);  // log(2 pi)
+    log_likelihood_ =
+        log_likelihood_ + normalise(log_weight) - Scalar(count) * Frame::density_constant();
     log_weight_ = log_weight;
     nis_ = nis;
     return Status::kOk;
@@ -250,8 +260,6 @@ class EkfSlat<Motion_, Imm<Models...>, Masters> {
     return all;
   }
 
-  int masters() const { return masters_; }
-
   /// The probability that model k moves master n.
   Scalar mode_probability(int n, int k) const {
     Weights part;
@@ -264,10 +272,21 @@ class EkfSlat<Motion_, Imm<Models...>, Masters> {
   }
 
   Scalar nis() const { return nis_; }  ///< of the last update: mean over the hypotheses before it
-  Scalar log_likelihood() const { return log_likelihood_; }  ///< of all sightings since reset
+
+  /// As SlatFilter::visit_state.
+  template <class Self, class Visit>
+  static void visit_state(Self& self, Visit& visit) {
+    Frame::visit_state(self, visit);
+    for (int h = 0; h < kHypotheses; ++h) visit(self.belief_[h]);
+    visit(self.log_weight_);
+    visit.count(self.hypotheses_, kHypotheses);
+    visit(self.nis_);
+  }
 
  private:
   using Weights = Vector<Scalar, kHypotheses>;
+  using Frame::log_likelihood_;
+  using Frame::masters_;
 
   static int mode_of(int hypothesis, int master) {
     return hypothesis / power(kModes, master) % kModes;
@@ -275,15 +294,15 @@ class EkfSlat<Motion_, Imm<Models...>, Masters> {
 
   /// False, with `belief` as it was, where the result would not be finite. `score` is of all
   /// echoes.
-  bool take_in(const Sighting<Scalar>* sightings, int count, const Sonar<Scalar>& sonar,
+  bool correct(const Echo<Scalar>* echoes, int count, const Sonar<Scalar>& sonar,
                BeliefType& belief, Score<Scalar>& score) const {
     BeliefType moved = belief;
     int who[Masters];
-    Model::identify(moved, sightings, count, masters_, sonar, params_.gate, who);
+    Model::identify(moved, echoes, count, masters_, sonar, params_.gate, who);
     score.nis = score.log_density = Scalar(0);
     for (int s = 0; s < count; ++s) {
       Score<Scalar> one;
-      if (!Model::correct(sightings[s].z, who[s], sonar, params_.gate, moved, one)) return false;
+      if (!Model::correct(echoes[s].z, who[s], sonar, params_.gate, moved, one)) return false;
       score.nis = score.nis + one.nis;
       score.log_density = score.log_density + one.log_density;
     }
@@ -328,9 +347,7 @@ class EkfSlat<Motion_, Imm<Models...>, Masters> {
   BeliefType belief_[kHypotheses];
   Weights log_weight_;  ///< those from hypotheses_ on: of weight 0
   int hypotheses_ = 0;
-  int masters_ = 0;
   Scalar nis_ = Scalar(0);
-  Scalar log_likelihood_ = Scalar(0);
 };
 
 }  // namespace auvest

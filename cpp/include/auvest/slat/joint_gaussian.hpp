@@ -12,8 +12,8 @@
 #include "auvest/models/sonar.hpp"
 #include "auvest/particles/log_weights.hpp"
 #include "auvest/slat/association.hpp"
+#include "auvest/slat/echo.hpp"
 #include "auvest/slat/likelihood.hpp"
-#include "auvest/slat/sighting.hpp"
 #include "auvest/types.hpp"
 
 namespace auvest {
@@ -76,7 +76,8 @@ struct JointGaussian {
     put(pose, 0, joint);
   }
 
-  /// Slave and masters move, block by block: P_ij <- Phi_i P_ij Phi_j' + (i = j) Q_i.
+  /// [SLATF 15], [SLATF 16] and [SLATF 50], block by block: P_ij <- Phi_i P_ij Phi_j' + (i = j)
+  /// Q_i.
   void predict(const typename Motion::Step& step, Scalar dt, const Vector<Scalar, 2>* changes,
                int masters, Joint& joint) const {
     SlaveBelief pose = part<kPose>(joint, 0);
@@ -97,8 +98,9 @@ struct JointGaussian {
     }
   }
 
-  /// Takes in an echo z of master n. False, with `joint` as it was, where the result would not be
-  /// finite. `score` is what the echo says: its NIS, and its density within the gate (0: no gate).
+  /// Corrects by an echo z of master n. False, with `joint` as it was, where the result would not
+  /// be finite. `score` is what the echo says: its NIS, and its density within the gate (0: no
+  /// gate).
   static bool correct(const Vector<Scalar, 2>& z, int n, const Sonar<Scalar>& sonar, Scalar gate,
                       Joint& joint, Score<Scalar>& score) {
     Joint ordered;
@@ -121,14 +123,14 @@ struct JointGaussian {
 
   /// Whose echoes they are. Unknown ones are those of the masters that make all echoes of the ping
   /// together the likeliest, each master at most once.
-  static void identify(const Joint& joint, const Sighting<Scalar>* sightings, int count,
-                       int masters, const Sonar<Scalar>& sonar, Scalar gate, int (&who)[Masters]) {
+  static void identify(const Joint& joint, const Echo<Scalar>* echoes, int count, int masters,
+                       const Sonar<Scalar>& sonar, Scalar gate, int (&who)[Masters]) {
     bool known = true;
     for (int s = 0; s < Masters; ++s) {
-      who[s] = s < count ? sightings[s].master : kUnknownMaster;
+      who[s] = s < count ? echoes[s].master : kUnknownMaster;
       known = known && (s >= count || who[s] != kUnknownMaster);
     }
-    if (!known) identify_from(0, joint, sightings, count, masters, sonar, gate, who);
+    if (!known) identify_from(0, joint, echoes, count, masters, sonar, gate, who);
   }
 
   /// Draws a share of what is uncertain in H x, the range and the bearing of master n, linearised:
@@ -174,8 +176,8 @@ struct JointGaussian {
 
   /// Identifies the echoes from `s` on, of which `joint` does not know yet, and returns their log
   /// density. `who` holds the masters that are known.
-  static Scalar identify_from(int s, const Joint& joint, const Sighting<Scalar>* sightings,
-                              int count, int masters, const Sonar<Scalar>& sonar, Scalar gate,
+  static Scalar identify_from(int s, const Joint& joint, const Echo<Scalar>* echoes, int count,
+                              int masters, const Sonar<Scalar>& sonar, Scalar gate,
                               int (&who)[Masters]) {
     if (s == count || s == Masters) return Scalar(0);  // count <= Masters
     Scalar greatest = no_log_weight<Scalar>();
@@ -191,9 +193,9 @@ struct JointGaussian {
       if (!possible) continue;
       Joint after = joint;
       Score<Scalar> score;
-      correct(sightings[s].z, n, sonar, gate, after, score);
-      const Scalar density = score.log_density + identify_from(s + 1, after, sightings, count,
-                                                               masters, sonar, gate, trial);
+      correct(echoes[s].z, n, sonar, gate, after, score);
+      const Scalar density = score.log_density + identify_from(s + 1, after, echoes, count, masters,
+                                                               sonar, gate, trial);
       if (density > greatest) {
         greatest = density;
         for (int other = 0; other < Masters; ++other) likeliest[other] = trial[other];
@@ -258,7 +260,7 @@ struct JointGaussian {
     for (int k = 2; k < kPose; ++k) joint.x(k) = math::wrap(joint.x(k));  // the heading
   }
 
-  /// The innovation of z, and A = H L with H = [G_S, G_M] of [SLATF 51].
+  /// The innovation of z, and A = H L with H = [G_S, G_M] of [SLATF 51] and [SLATF 20].
   static void look(const Joint& ordered, const Matrix<Scalar, kObserved, kObserved>& root,
                    const Vector<Scalar, 2>& z, const Sonar<Scalar>& sonar,
                    Matrix<Scalar, 2, kObserved>& a, Vector<Scalar, 2>& innovation) {

@@ -9,8 +9,8 @@
 
 namespace auvest {
 
-/// log N(innovation; 0, S) + M/2 log(2 pi) from what potter() leaves; never below -1e20, nor a NaN.
-/// -1e20 where `valid` is false.
+/// log N(innovation; 0, S) + M/2 log(2 pi) of [SLATF 31] from what potter() leaves; never below
+/// -1e20, nor a NaN. -1e20 where `valid` is false.
 template <class Value, int O, int M>
 AUVEST_INLINE Value log_density(const math::Mask<Value>& valid,
                                 const Posterior<Value, O>& posterior,

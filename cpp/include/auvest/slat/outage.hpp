@@ -5,13 +5,13 @@
 //     outage.predict(...), update(...)  no word came: the filter starts from the last shared state
 //     outage.slave()                    the shared state, or the filter's
 //
-// Filter: Slatf, EkfSlat or DeadReckoning.
+// Filter: one of slat_filter.hpp.
 #pragma once
 
 #include <cstdint>
 
 #include "auvest/math/random.hpp"
-#include "auvest/slat/sighting.hpp"
+#include "auvest/slat/echo.hpp"
 #include "auvest/status.hpp"
 #include "auvest/types.hpp"
 
@@ -33,7 +33,14 @@ class Outage {
   using MasterBelief = typename Filter::MasterBelief;
   using VelocityChange = typename Filter::VelocityChange;
 
+  /// Goes on with a copy of `filter`.
   explicit Outage(const Filter& filter) : filter_(filter), mode_(Communication::kNever) {}
+
+  /// The same for a filter with particles: those of the copy live in `storage`, which is as large
+  /// as that of `filter` and must outlive the outage. It may be the same, where `filter` is not
+  /// used any more.
+  Outage(const Filter& filter, Scalar* storage)
+      : filter_(filter, storage), mode_(Communication::kNever) {}
 
   /// Takes over what communication brings, and ends an outage. `masters` holds `count` beliefs.
   Status share(const SlaveBelief& slave, const MasterBelief* masters, int count) {
@@ -68,11 +75,10 @@ class Outage {
   }
 
   /// An echo counts only while the filter runs.
-  Status update(const Sighting<Scalar>* sightings, int count, const Sonar<Scalar>& sonar,
+  Status update(const Echo<Scalar>* echoes, int count, const Sonar<Scalar>& sonar,
                 math::Random& random) {
     if (mode_ == Communication::kNever) return Status::kNotInitialised;
-    return mode_ == Communication::kUp ? Status::kOk
-                                       : filter_.update(sightings, count, sonar, random);
+    return mode_ == Communication::kUp ? Status::kOk : filter_.update(echoes, count, sonar, random);
   }
 
   SlaveBelief slave() const { return mode_ == Communication::kDown ? filter_.slave() : slave_; }
@@ -88,6 +94,20 @@ class Outage {
   MasterBelief masters_[Masters];
   int count_ = 0;
   Communication mode_;
+
+ public:
+  int shared_masters() const { return count_; }  ///< of the last shared state
+
+  /// Hands all numbers of the state to `visit`, which keeps them, or overwrites them by those that
+  /// were kept: to save a filter and to go on from there. `Self` is this class, const to save.
+  template <class Self, class Visit>
+  static void visit_state(Self& self, Visit& visit) {
+    visit.count(self.mode_, Communication::kDown);
+    visit.count(self.count_, Masters);
+    if (self.mode_ != Communication::kNever) visit(self.slave_);
+    for (int n = 0; n < self.count_; ++n) visit(self.masters_[n]);
+    visit(self.filter_);
+  }
 };
 
 }  // namespace auvest

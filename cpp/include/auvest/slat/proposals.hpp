@@ -1,13 +1,12 @@
 // From what the particles' poses are drawn: all that differs between SLATF 1.0 and 2.0.
 //
 //     MotionProposal        1.0  p(X | u), [SLATF 12]: blind to the measurement
-//     MeasurementProposal   2.0  p(X | u, z), [SLATF 45]: linearised, Gaussian
+//     MeasurementProposal   2.0  p(X | u, z), [SLATF 46]: linearised, Gaussian
 //
 // 2.0 draws no pose before a measurement comes. Between two of them (odometry may be faster than
 // the sonar) each particle carries a mean and a covariance P_S of what its pose has gathered since
 // it was last drawn. Differs from [SLATF 50]: a drawn pose is a point, so P_S starts again from
-// zero, as in FastSLAM 2.0; `carry_covariance` keeps Sigma of [SLATF 57] instead, as [SLATF 50]
-// reads.
+// zero, as in FastSLAM 2.0; `carry_covariance` keeps Sigma of [SLATF 57] instead, as it reads.
 #pragma once
 
 #include "auvest/filters/square_root_update.hpp"
@@ -24,7 +23,7 @@ struct MotionProposal {
   static AUVEST_INLINE void predict(const Motion& motion, const typename Motion::Step& step,
                                     const Value& a, const Value& b,
                                     Belief<Value, Motion::kStates>& pose) {
-    motion.sample(step, a, b, pose.x);  // [SLATF 12]
+    motion.sample(step, a, b, pose.x);  // [SLATF 10] [SLATF 12]
   }
 };
 
@@ -35,12 +34,12 @@ struct MeasurementProposal {
   static AUVEST_INLINE void predict(const Motion& motion, const typename Motion::Step& step,
                                     const Value&, const Value&,
                                     Belief<Value, Motion::kStates>& pose) {
-    motion.propagate(step, pose);  // [SLATF 50]
+    motion.propagate(step, pose);  // [SLATF 11] [SLATF 50]
   }
 
-  /// Takes one measurement into the proposal N(pose.x, root root'), given the root of the
-  /// covariance of the master's position, and returns the logarithm of the weight without the
-  /// constant.
+  /// Refines the proposal N(pose.x, root root') by an echo, [SLATF 51] of it in `view`, given its
+  /// noise R and the root of the covariance of the master's position. Returns the logarithm of the
+  /// weight, without the constant. Beyond a NIS of `gate` the echo says nothing.
   ///
   /// Differs from [SLATF 57] and [SLATF 58], which need P_S^-1: with P_S = L L' and in the
   /// coordinates of L the same update needs no inverse, so P_S may be singular (zero speed, a
@@ -67,8 +66,7 @@ struct MeasurementProposal {
     // [SLATF 65]: L = G_S P_S G_S' + Lambda, whose determinant stays in lambda
     math::Mask<Value> valid = potter(by_slave, lambda, view.innovation, posterior);
     saturate(gate, posterior);
-    // [SLATF 57] [SLATF 58]: Sigma = root root', and mu
-    valid = valid && move_belief(pose, root, no_others, posterior);
+    valid = valid && move_belief(pose, root, no_others, posterior);  // [SLATF 57] [SLATF 58]
     if (!all(valid)) {
       math::copy_where(!valid, before, pose);
       math::copy_where(!valid, prior_root, root);

@@ -3,9 +3,9 @@
 // In SLATF 2.0 a particle's pose is a point. But slave and masters share a drift that no sonar sees
 // (move all of them together and every echo stays the same), and what is represented by points
 // alone, without noise of its own, dies out as particles are resampled. Here a particle is the
-// joint Gaussian of pose and masters, cross-covariances included: Eq. (50), which carries a
+// joint Gaussian of pose and masters, cross-covariances included: [SLATF 50], which carries a
 // covariance of the pose, taken at its word. The echoes of a ping update the whole Gaussian and
-// weigh it by Eq. (65). Then the particle draws what the sonar's equations are curved in and the
+// weigh it by [SLATF 65]. Then the particle draws what the sonar's equations are curved in and the
 // slave's noise makes new from ping to ping, range and bearing of one master. The drift, the
 // velocities, the other masters and a share of range and bearing stay Gaussian.
 //
@@ -22,8 +22,9 @@
 #include "auvest/particles/mixture.hpp"
 #include "auvest/particles/particle_set.hpp"
 #include "auvest/particles/resampling.hpp"
+#include "auvest/slat/echo.hpp"
 #include "auvest/slat/joint_gaussian.hpp"
-#include "auvest/slat/sighting.hpp"
+#include "auvest/slat/slat_filter.hpp"
 #include "auvest/status.hpp"
 #include "auvest/types.hpp"
 
@@ -31,77 +32,75 @@ namespace auvest {
 
 template <class Scalar>
 struct SlatfJointParams {
-  Scalar resample_below = Scalar(0.5);  ///< resample where N_eff < this times N, Eq. (33)
+  Scalar resample_below = Scalar(0.5);  ///< resample where N_eff < this times N, [SLATF 33]
   Scalar kept = Scalar(0.5);  ///< share of the covariance of range and bearing that is not drawn
   /// An echo whose NIS (2 degrees of freedom) exceeds this in a particle says nothing to it;
   /// against outliers. 16 loses one good echo in 3,000. 0: no gate.
   Scalar gate = Scalar(0);
 };
 
+/// The fields of a particle: the pose and each master, mean and lower triangle, then the
+/// covariances between them, each master's six rows up to its own block.
+template <int Pose, int Masters>
+struct SlatfJointFields {
+  static constexpr int kPoseField = 0;
+  static constexpr int kMasterField = Pose + triangle_numbers(Pose);
+  static constexpr int kMasterNumbers = 6 + triangle_numbers(6);
+  static constexpr int kCrossField = kMasterField + Masters * kMasterNumbers;
+  static constexpr int kCrossNumbers = Masters * (6 * Pose) + 36 * (Masters * (Masters - 1) / 2);
+  static constexpr int kFields = kCrossField + kCrossNumbers;
+};
+
+template <class Motion, int Masters, class Resampling>
+using SlatfJointFrame = ParticleSlatFilter<
+    Motion, Masters,
+    ParticleSet<typename Motion::Scalar, SlatfJointFields<Motion::kStates, Masters>::kFields>,
+    Resampling>;
+
 template <class Motion_, class Master_, int Masters, class Resampling_ = SystematicResampling>
-class SlatfJoint {
+class SlatfJoint : public SlatfJointFrame<Motion_, Masters, Resampling_>,
+                   public SlatfJointFields<Motion_::kStates, Masters> {
  public:
+  using Frame = SlatfJointFrame<Motion_, Masters, Resampling_>;
+  using Fields = SlatfJointFields<Motion_::kStates, Masters>;
   using Motion = Motion_;
   using Master = Master_;
   using Resampling = Resampling_;
   using Model = JointGaussian<Motion, Master, Masters>;
-  using Scalar = typename Motion::Scalar;
-  using Control = typename Motion::Control;
+  using typename Frame::Control;
+  using typename Frame::MasterBelief;
+  using typename Frame::Scalar;
+  using typename Frame::SlaveBelief;
+  using typename Frame::VelocityChange;
   using Params = SlatfJointParams<Scalar>;
-  static constexpr int kPose = Model::kPose;
-  static constexpr int kMasters = Masters;
-  using SlaveBelief = typename Model::SlaveBelief;
-  using MasterBelief = typename Model::MasterBelief;
   using Joint = typename Model::Joint;
-  using VelocityChange = Vector<Scalar, 2>;
-
-  // The fields of a particle: the pose and each master, mean and lower triangle, then the
-  // covariances between them, each master's six rows up to its own block.
-  static constexpr int kPoseField = 0;
-  static constexpr int kMasterField = kPose + triangle_numbers(kPose);
-  static constexpr int kMasterNumbers = 6 + triangle_numbers(6);
-  static constexpr int kCrossField = kMasterField + Masters * kMasterNumbers;
-  static constexpr int kCrossNumbers = Masters * (6 * kPose) + 36 * (Masters * (Masters - 1) / 2);
-  using Set = ParticleSet<Scalar, kCrossField + kCrossNumbers>;
-  template <int Capacity>
-  using Storage = ParticleStorage<Scalar, Set::kFields, Capacity>;
+  static constexpr int kPose = Model::kPose;
 
   /// The particles live in `storage`, which holds at least Set::storage_size(capacity) numbers and
   /// must outlive the filter.
   SlatfJoint(const Motion& motion, const Master& master, const Params& params, Scalar* storage,
              int capacity, const Resampling& resampling = Resampling())
-      : model_(motion, master), params_(params), set_(storage, capacity), resampling_(resampling) {}
+      : Frame(storage, capacity, resampling), model_(motion, master), params_(params) {}
 
   template <int Capacity>
   SlatfJoint(const Motion& motion, const Master& master, const Params& params,
-             ParticleStorage<Scalar, Set::kFields, Capacity>& storage,
+             ParticleStorage<Scalar, Fields::kFields, Capacity>& storage,
              const Resampling& resampling = Resampling())
       : SlatfJoint(motion, master, params, storage.numbers, Capacity, resampling) {}
 
-  /// A copy of `other` that goes on with the copy of its particles that lies in `storage`.
-  SlatfJoint(const SlatfJoint& other, Scalar* storage) : SlatfJoint(other) {
-    set_ = Set(storage, other.set_);
-  }
+  /// A copy of `other`, whose particles are copied into a storage as large as its own.
+  SlatfJoint(const SlatfJoint& other, Scalar* storage)
+      : Frame(other, storage), model_(other.model_), params_(other.params_) {}
 
   /// All particles hold the belief `pose`, whose P may be singular or zero; there is no master yet.
   /// Nothing is drawn before an echo comes.
   Status reset(const SlaveBelief& pose, int particles, math::Random&) {
-    const bool valid = particles > 0 && particles <= set_.capacity() &&
-                       is_share(params_.resample_below) && is_share(params_.kept) &&
-                       math::is_nonnegative(params_.gate);
-    if (!valid || model_.check() != Status::kOk) {
-      return Status::kBadParameter;
-    }
-    if (!math::all_finite(pose.x) || !math::lower_finite(pose.P)) return Status::kNotFinite;
-    for (int i = 0; i < kPose; ++i) {
-      if (pose.P(i, i) < Scalar(0)) return Status::kNotPositiveDefinite;
-    }
-    set_.resize(particles);
-    masters_ = 0;
-    resamplings_ = 0;
-    log_likelihood_ = Scalar(0);
-    effective_size_ = Scalar(particles);
-    equal_weights(set_);
+    const bool valid = this->fits(particles) && Frame::is_share(params_.resample_below) &&
+                       Frame::is_share(params_.kept) && math::is_nonnegative(params_.gate);
+    if (!valid || model_.check() != Status::kOk) return Status::kBadParameter;
+    const Status status = Frame::check_slave(pose);
+    if (status != Status::kOk) return status;
+    this->start(particles);
     Joint joint;
     Model::start(pose, joint);
     for (int i = 0; i < set_.size(); ++i) store(i, joint);
@@ -116,10 +115,8 @@ class SlatfJoint {
 
   /// One more master, with the same belief in all particles. Masters are numbered from 0.
   Status add_master(const MasterBelief& belief) {
-    if (set_.size() == 0) return Status::kNotInitialised;
-    if (masters_ == Masters) return Status::kBadParameter;
-    if (!math::all_finite(belief.x) || !math::lower_finite(belief.P)) return Status::kNotFinite;
-    if (!math::is_positive_definite(belief.P)) return Status::kNotPositiveDefinite;
+    const Status status = this->check_master(belief);
+    if (status != Status::kOk) return status;
     for (int i = 0; i < set_.size(); ++i) {
       store_belief<Lanes>(set_.at(i, master_field(masters_)), belief);
     }
@@ -133,7 +130,7 @@ class SlatfJoint {
   /// master; null: none. Takes no random numbers.
   Status predict(Scalar dt, const Control& u, math::Random&,
                  const VelocityChange* changes = nullptr) {
-    const Status status = check(dt, u, changes);
+    const Status status = this->check_prediction(dt, u, changes);
     if (status != Status::kOk) return status;
     const typename Motion::Step move = model_.motion.step(u, dt);
     for (int i = 0; i < set_.size(); ++i) {
@@ -145,30 +142,30 @@ class SlatfJoint {
     return Status::kOk;
   }
 
-  /// Takes in what the sonar heard at one time: any number of masters, each at most once. Echoes of
-  /// kUnknownMaster are, in each particle, those of the masters that make all echoes together the
-  /// likeliest. Takes one key of random numbers, then what the resampling policy takes.
-  Status update(const Sighting<Scalar>* sightings, int count, const Sonar<Scalar>& sonar,
+  /// Updates by what the sonar heard at one time: any number of masters, each at most once. Echoes
+  /// of kUnknownMaster are, in each particle, those of the masters that make all echoes together
+  /// the likeliest. Takes one key of random numbers, then what the resampling policy takes.
+  Status update(const Echo<Scalar>* echoes, int count, const Sonar<Scalar>& sonar,
                 math::Random& random) {
-    const Status status = check(sightings, count, sonar);
+    const Status status = this->check_update(echoes, count, masters_, sonar);
     if (status != Status::kOk || count == 0) return status;
     const math::CounterKey key(random);
     for (int i = 0; i < set_.size(); ++i) {
       Joint joint;
       load(i, joint);
-      take_in(i, sightings, count, sonar, key, joint);
+      correct(i, echoes, count, sonar, key, joint);
       store(i, joint);
     }
-    conclude(count, random);
+    this->template normalise_and_resample<Lanes>(count, params_.resample_below, random);
     return Status::kOk;
   }
 
   /// predict() and update() in one pass over the particles: the same bits.
   Status step(Scalar dt, const Control& u, const VelocityChange* changes,
-              const Sighting<Scalar>* sightings, int count, const Sonar<Scalar>& sonar,
+              const Echo<Scalar>* echoes, int count, const Sonar<Scalar>& sonar,
               math::Random& random) {
-    Status status = check(dt, u, changes);
-    if (status == Status::kOk) status = check(sightings, count, sonar);
+    Status status = this->check_prediction(dt, u, changes);
+    if (status == Status::kOk) status = this->check_update(echoes, count, masters_, sonar);
     if (status != Status::kOk) return status;
     if (count == 0) return predict(dt, u, random, changes);
     const typename Motion::Step move = model_.motion.step(u, dt);
@@ -177,15 +174,17 @@ class SlatfJoint {
       Joint joint;
       load(i, joint);
       model_.predict(move, dt, changes, masters_, joint);
-      take_in(i, sightings, count, sonar, key, joint);
+      correct(i, echoes, count, sonar, key, joint);
       store(i, joint);
     }
-    conclude(count, random);
+    this->template normalise_and_resample<Lanes>(count, params_.resample_below, random);
     return Status::kOk;
   }
 
   /// Mean and covariance of the slave's pose; the heading's mean is that of unit vectors.
-  SlaveBelief slave() const { return summarise<Lanes, kPose, true, (kPose > 2)>(set_, kPoseField); }
+  SlaveBelief slave() const {
+    return summarise<Lanes, kPose, true, (kPose > 2)>(set_, Fields::kPoseField);
+  }
 
   /// Mean and covariance of master n.
   MasterBelief master(int n) const {
@@ -199,24 +198,17 @@ class SlatfJoint {
     return joint;
   }
 
-  int particles() const { return set_.size(); }
-  int masters() const { return masters_; }
-  Scalar effective_size() const { return effective_size_; }  ///< N_eff before any resampling
-  int resamplings() const { return resamplings_; }           ///< since reset
-  Scalar log_likelihood() const { return log_likelihood_; }  ///< of all sightings since reset
-  const Set& set() const { return set_; }
-
  private:
   using Lanes = OneLane<Scalar>;
+  using Frame::masters_;
+  using Frame::set_;
 
-  static bool is_share(Scalar value) { return value >= Scalar(0) && value <= Scalar(1); }
-
-  static int master_field(int n) { return kMasterField + n * kMasterNumbers; }
+  static int master_field(int n) { return Fields::kMasterField + n * Fields::kMasterNumbers; }
 
   /// Calls visit(offset from the first field, row, column) for all covariances between blocks.
   template <class Visit>
   static void for_each_cross(const Visit& visit) {
-    int offset = kCrossField * kBlock;
+    int offset = Fields::kCrossField * kBlock;
     for (int n = 0; n < Masters; ++n) {
       for (int row = Model::first_of(n); row < Model::first_of(n) + 6; ++row) {
         for (int column = 0; column < Model::first_of(n); ++column, offset += kBlock) {
@@ -239,7 +231,7 @@ class SlatfJoint {
     for_each_cross([&](int offset, int row, int column) { joint.P(row, column) = from[offset]; });
   }
 
-  void store(int i, const Joint& joint) const {
+  void store(int i, const Joint& joint) {
     Scalar* to = set_.at(i, 0);
     store_belief<Lanes>(to, Model::template part<kPose>(joint, 0));
     for (int n = 0; n < Masters; ++n) {
@@ -249,29 +241,17 @@ class SlatfJoint {
     for_each_cross([&](int offset, int row, int column) { to[offset] = joint.P(row, column); });
   }
 
-  Status check(Scalar dt, const Control& u, const VelocityChange* changes) const {
-    if (set_.size() == 0) return Status::kNotInitialised;
-    if (!math::is_finite(dt) || !math::all_finite(u)) return Status::kNotFinite;
-    if (dt < Scalar(0)) return Status::kTimeBackwards;
-    return plan_finite(changes, masters_) ? Status::kOk : Status::kNotFinite;
-  }
-
-  Status check(const Sighting<Scalar>* sightings, int count, const Sonar<Scalar>& sonar) const {
-    if (set_.size() == 0) return Status::kNotInitialised;
-    return check_sightings(sightings, count, masters_, sonar, kPose, false);
-  }
-
   /// All that the echoes do to particle i: they refine its Gaussian one after the other and weigh
-  /// it, Eq. (65). Then it draws, once: the master of the first echo within the gate.
-  void take_in(int i, const Sighting<Scalar>* sightings, int count, const Sonar<Scalar>& sonar,
-               const math::CounterKey& key, Joint& joint) const {
+  /// it, [SLATF 65]. Then it draws, once: the master of the first echo within the gate.
+  void correct(int i, const Echo<Scalar>* echoes, int count, const Sonar<Scalar>& sonar,
+               const math::CounterKey& key, Joint& joint) {
     Scalar& log_weight = set_.log_weights()[i];
     int first = kUnknownMaster;
     int who[Masters];
-    Model::identify(joint, sightings, count, masters_, sonar, params_.gate, who);
+    Model::identify(joint, echoes, count, masters_, sonar, params_.gate, who);
     for (int s = 0; s < count && s < Masters; ++s) {  // count <= Masters
       Score<Scalar> score;
-      const bool finite = Model::correct(sightings[s].z, who[s], sonar, params_.gate, joint, score);
+      const bool finite = Model::correct(echoes[s].z, who[s], sonar, params_.gate, joint, score);
       const bool outlier = params_.gate > Scalar(0) && score.nis > params_.gate;
       if (first == kUnknownMaster && finite && !outlier) first = who[s];
       log_weight = log_weight + score.log_density;
@@ -282,26 +262,8 @@ class SlatfJoint {
     Model::draw(first, sonar, params_.kept, e, joint);
   }
 
-  /// Normalises, and resamples where few particles are left.
-  void conclude(int count, math::Random& random) {
-    const WeightSummary<Scalar> summary = normalise<Lanes>(set_);
-    effective_size_ = summary.effective_size;
-    log_likelihood_ =
-        log_likelihood_ + (summary.log_sum - Scalar(count) * Scalar(1.8378770664));  // log(2 pi)
-    if (effective_size_ < params_.resample_below * Scalar(set_.size())) {
-      resample<Lanes>(resampling_, set_, random);
-      ++resamplings_;
-    }
-  }
-
   Model model_;
   Params params_;
-  Set set_;
-  Resampling resampling_;
-  int masters_ = 0;
-  int resamplings_ = 0;
-  Scalar log_likelihood_ = Scalar(0);
-  Scalar effective_size_ = Scalar(0);
 };
 
 }  // namespace auvest

@@ -36,7 +36,7 @@ constexpr uint32_t kPause = wake_timer::to_ticks(0.05f);  // enough to look at t
 
 Motion::Params readings_noise() {
   Motion::Params params;
-  params.sigma_speed_mps = kSigmaSpeed;
+  params.sigma_speed_m_s = kSigmaSpeed;
   params.sigma_heading_rad = kSigmaHeading;
   return params;
 }
@@ -88,7 +88,7 @@ AUVEST_OUTLINE void predict(float from_s, float to_s) {
 }
 
 AUVEST_OUTLINE void update() {
-  const auvest::Sighting<float> echo = {sample.z, 0};
+  const auvest::Echo<float> echo = {sample.z, 0};
   note(filter.update(&echo, 1, sonar, random_numbers));
 }
 

@@ -1,0 +1,643 @@
+"""What the SLAT filters and :class:`~auvest.Outage` share: steps, records, saved states.
+
+All of the estimation is C++ (``cpp/include/auvest/slat``). The core takes arguments as they are
+where they are plain; what it does not take is converted here, or refused with what is wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from auvest import _core, _state
+from auvest._arguments import (
+    DType,
+    Exclusive,
+    Floats,
+    as_array,
+    as_dtype,
+    as_flag,
+    as_instance,
+    as_integer,
+    as_number,
+    as_step,
+    require_range,
+)
+from auvest._core import Status
+from auvest.errors import FilterError
+from auvest.slat.models import (
+    CompassMotion,
+    Motion,
+    PiecewiseAcceleration,
+    Sonar,
+    UnicycleMotion,
+    core_params,
+    core_sonar,
+)
+from auvest.slat.results import SlatRun
+
+#: Masters that a filter can track.
+MAX_MASTERS = _core.slat_max_masters
+#: The master of an echo of which nobody knows whose it is.
+UNKNOWN_MASTER = _core.slat_unknown_master
+
+#: Ranges and bearings that the filters take at most.
+_LARGEST_Z = 1e9
+
+COMPASS = CompassMotion()
+MASTER = PiecewiseAcceleration()
+SONAR = Sonar()
+
+_Self = TypeVar("_Self", bound="Steps")
+
+
+class Steps:
+    """Prediction, update, record and saved state of the filters and of :class:`Outage`."""
+
+    _core_steps: Any
+    _dtype: DType
+    _motion: Motion
+    _sonar: Sonar
+    _device: _core._Sonar  # the sonar in the core
+    _random: _core.Random
+    _status: Status
+    _exclusive: Exclusive
+    _deaf: bool = False  # hears no echo, so that it does not matter whose it is
+    _births: bool = False  # an echo of which nothing is said is of nobody knows whom
+
+    @property
+    def x(self) -> Floats:
+        """The slave's estimated pose (m, rad), shape (n,), a copy."""
+        with self._exclusive:
+            x: Floats = self._slave()[0]
+        return x
+
+    @property
+    def P(self) -> Floats:
+        """Its covariance, shape (n, n), a copy."""
+        with self._exclusive:
+            p: Floats = self._slave()[1]
+        return p
+
+    def master(self, n: int) -> tuple[Floats, Floats]:
+        """Give mean (6,) and covariance (6, 6) of master n, ``[x, y, vx, vy, ax, ay]``.
+
+        Raises
+        ------
+        ValueError, TypeError
+            If there is no such master.
+        """
+        with self._exclusive:
+            x, p = self._core_steps.master(self._as_master(n))
+        return x, p
+
+    @property
+    def status(self) -> Status:
+        """What the core reported last: ``Status.ok`` unless a FilterError was raised."""
+        return self._status
+
+    @property
+    def dtype(self) -> DType:
+        """float32 or float64."""
+        return self._dtype
+
+    @property
+    def motion(self) -> Motion:
+        """How the slave moves."""
+        return self._motion
+
+    @property
+    def sonar(self) -> Sonar:
+        """The sonar that ``update`` and ``run`` use unless told otherwise."""
+        return self._sonar
+
+    def predict(self, dt: float, u: npt.ArrayLike, *, changes: npt.ArrayLike | None = None) -> None:
+        """Carry slave and masters ``dt >= 0`` seconds forward.
+
+        Parameters
+        ----------
+        dt : float
+            Seconds.
+        u : array_like, shape (2,)
+            The slave's reading during that time, see its motion.
+        changes : array_like, shape (masters, 2), optional
+            Velocity changes that the masters planned for that time, m/s; default: none known.
+
+        Raises
+        ------
+        ValueError, TypeError
+            If an argument is wrong.
+        FilterError
+            If the prediction cannot be done. In all cases the filter is unchanged.
+        """
+        move = (dt, u, changes)
+        self._do("predict", move, lambda: self._as_move(*move), self._random)
+
+    def update(
+        self,
+        z: npt.ArrayLike | None,
+        master: npt.ArrayLike | None = None,
+        *,
+        sonar: Sonar | None = None,
+    ) -> None:
+        """Take in what the sonar heard at one time.
+
+        Parameters
+        ----------
+        z : array_like, shape (2,) or (K, 2), or None
+            Range (m) and bearing (rad) of each echo. None or NaN rows: missing.
+        master : int or array_like of int, shape (K,), optional
+            The master of each echo, each at most once; ``UNKNOWN_MASTER``: nobody knows. May be
+            left out where there is only one; where masters can be born it is then unknown.
+        sonar : Sonar, optional
+            Default: the filter's own.
+
+        Raises
+        ------
+        ValueError, TypeError
+            If an argument is wrong.
+        FilterError
+            If the update cannot be done; the filter is then unchanged.
+        """
+        heard = (z, None if self._deaf else master)
+        device = self._as_device(sonar)
+        self._do(
+            "update", heard, lambda: self._as_echoes(*heard), self._unknown, device, self._random
+        )
+
+    def run(
+        self,
+        time_s: npt.ArrayLike,
+        u: npt.ArrayLike,
+        *,
+        z: npt.ArrayLike | None = None,
+        z_time_s: npt.ArrayLike | None = None,
+        master: npt.ArrayLike | None = None,
+        changes: npt.ArrayLike | None = None,
+        sonar: Sonar | None = None,
+    ) -> SlatRun:
+        """Predict and update over a record, in C++ and without the GIL.
+
+        Parameters
+        ----------
+        time_s : array_like, shape (T + 1,)
+            Ascending times, s, kept in float64: reading k holds from ``time_s[k]`` to
+            ``time_s[k + 1]``.
+        u : array_like, shape (T, 2)
+            The slave's readings.
+        z : array_like, shape (K, 2), optional
+            Echoes: range (m) and bearing (rad). NaN rows: missing, as if they were not there.
+        z_time_s : array_like, shape (K,), optional
+            Their times, ascending, from ``time_s[0]`` to ``time_s[T]``. Echoes of one time are one
+            update. Must be given with ``z``.
+        master : int or array_like of int, shape (K,), optional
+            As for :meth:`update`.
+        changes : array_like, shape (T, masters, 2), optional
+            Planned velocity changes of the masters during each interval, m/s, spread evenly over
+            it.
+        sonar : Sonar, optional
+            Default: the filter's own.
+
+        Returns
+        -------
+        SlatRun
+
+        Raises
+        ------
+        ValueError, TypeError
+            If an argument is wrong; the filter is unchanged.
+        FilterError
+            If a row cannot be done. ``step`` names it, ``partial`` holds the results before it, and
+            the filter stays where the step that was refused met it.
+        """
+        device = self._as_device(sonar)
+        double = np.dtype(np.float64)
+        times = as_array("time_s", time_s, (None,), double)
+        if len(times) < 2:
+            raise ValueError(f"time_s must have at least 2 elements, not {len(times)}")
+        _require_ascending("time_s", times)
+        rows = len(times) - 1
+        readings = as_array("u", u, (rows, 2), self._dtype)
+        if (z is None) != (z_time_s is None):
+            raise ValueError("z and z_time_s belong together: give both or none")
+        with self._exclusive:
+            plan: Floats = np.empty((0, 0, 2), self._dtype)
+            if changes is not None:
+                masters = max(1, self._core_steps.masters)
+                plan = as_array("changes", changes, (rows, masters, 2), self._dtype)
+            echoes: Floats = np.empty((0, 2), self._dtype)
+            numbers: npt.NDArray[np.int64] = np.empty(0, np.int64)
+            heard_at: Floats = np.empty(0)
+            if z is not None:
+                echoes = as_array("z", z, (None, 2), self._dtype, missing=True)
+                _require_moderate(echoes)
+                heard_at = as_array("z_time_s", z_time_s, (len(echoes),), double)
+                _require_ascending("z_time_s", heard_at)
+                if heard_at[0] < times[0] or heard_at[-1] > times[-1]:
+                    raise ValueError(
+                        f"z_time_s must lie within time_s, {times[0]} to {times[-1]}; "
+                        f"it reaches from {heard_at[0]} to {heard_at[-1]}"
+                    )
+                numbers = self._as_numbers(None if self._deaf else master, len(echoes))
+                there = ~np.isnan(echoes[:, 0])
+                echoes, numbers, heard_at = echoes[there], numbers[there], heard_at[there]
+            out = self._core_steps.run(
+                times, readings, plan, heard_at, echoes, numbers, device, self._random
+            )
+            done = out["done"]
+            width = int(out["masters"][:done].max(initial=0))
+            result = SlatRun(
+                time_s=times[1 : done + 1],
+                x=out["x"][:done],
+                P=out["P"][:done],
+                masters_x=out["masters_x"][:done, :width],
+                masters_P=out["masters_P"][:done, :width],
+                effective_size=out["effective_size"][:done],
+                resamplings=out["resamplings"][:done],
+                log_likelihood=out["log_likelihood"][:done],
+                nis=out["nis"][:done],
+            )
+            self._status = out["status"]
+        if self._status != Status.ok:
+            raise FilterError("run", self._status, step=done, partial=result)
+        return result
+
+    def save(self) -> bytes:
+        """Give the whole state, with that of the random numbers, for :meth:`restore`.
+
+        Models and parameters are named in it but are not part of it; pickle the filter to keep
+        those too.
+        """
+        with self._exclusive:
+            arrays = {**self._core_steps.save(), "random": self._random.save()}
+        return _state.pack(type(self).__name__, self._description(), arrays)
+
+    def restore(self, state: bytes) -> None:
+        """Take back what :meth:`save` gave; the filter goes on with the same bits.
+
+        Raises
+        ------
+        ValueError, TypeError
+            If the state is damaged, or not that of a filter of this class with these models,
+            parameters and precision; the message names what differs. The filter is then unchanged.
+        """
+        arrays = _state.unpack(state, type(self).__name__, self._description())
+        with self._exclusive:
+            self._core_steps.restore(arrays["numbers"], arrays["counts"])
+            self._random.restore(arrays["random"])
+            self._status = Status.ok
+
+    def __getstate__(self) -> dict[str, Any]:
+        in_the_core = ("_core_steps", "_device", "_random", "_exclusive")
+        kept = {name: value for name, value in self.__dict__.items() if name not in in_the_core}
+        return {**kept, "state": self.save()}
+
+    def __setstate__(self, pickled: dict[str, Any]) -> None:
+        kept = dict(pickled)
+        state, status = kept.pop("state"), kept["_status"]
+        self.__dict__.update(kept)
+        self._prepare()
+        self._random = _core.Random(0)
+        self.restore(state)
+        self._status = status
+
+    def __deepcopy__(self: _Self, memo: dict[int, Any]) -> _Self:
+        twin = type(self).__new__(type(self))
+        with self._exclusive:
+            twin.__dict__.update(self.__dict__)
+            twin._core_steps = self._core_steps.copy()
+            twin._random = self._random.copy()
+        twin._exclusive = Exclusive()
+        memo[id(self)] = twin
+        return twin
+
+    def __copy__(self: _Self) -> _Self:
+        return self.__deepcopy__({})
+
+    @property
+    def _unknown(self) -> bool:
+        return self._deaf or self._births
+
+    def _prepare(self) -> None:
+        """Build the filter in the core, and what goes with it."""
+        raise NotImplementedError
+
+    def _description(self) -> dict[str, Any]:
+        """Say what a filter must have in common with this one to take its state."""
+        raise NotImplementedError
+
+    def _slave(self) -> tuple[Floats, Floats]:
+        x, p = self._core_steps.slave()
+        return x, p
+
+    def _do(
+        self, name: str, plain: tuple[Any, ...], convert: Callable[[], tuple[Any, ...]], *rest: Any
+    ) -> None:
+        """Have the core do it with arguments as they are, or converted where they are not plain."""
+        with self._exclusive:
+            method = getattr(self._core_steps, name)
+            try:
+                if not method(*plain, *rest) and not method(*convert(), *rest):
+                    raise AssertionError(f"{name}: converted arguments are plain")
+            except _core.StatusError as error:
+                self._status = error.status
+                action = name if name == "update" else f"{name}(dt={plain[0]})"
+                raise FilterError(action, error.status) from None
+            self._status = Status.ok
+
+    def _as_master(self, n: int) -> int:
+        count = self._core_steps.masters
+        if count == 0:
+            raise ValueError(f"there is no master {n}: none was added")
+        return as_integer("n", n, 0, count - 1)
+
+    def _as_device(self, sonar: Sonar | None) -> _core._Sonar:
+        if sonar is None:
+            return self._device
+        as_instance("sonar", sonar, Sonar)
+        require_heading(sonar, self._motion)
+        return core_sonar(sonar, self._dtype.name)
+
+    def _as_move(
+        self, dt: float, u: npt.ArrayLike, changes: npt.ArrayLike | None
+    ) -> tuple[float, Floats, Floats | None]:
+        plan = None
+        if changes is not None:
+            masters = max(1, self._core_steps.masters)
+            plan = as_array("changes", changes, (masters, 2), self._dtype)
+        return as_step(dt, self._dtype), as_array("u", u, (2,), self._dtype), plan
+
+    def _as_echoes(
+        self, z: npt.ArrayLike | None, master: npt.ArrayLike | None
+    ) -> tuple[Floats | None, npt.NDArray[np.int64] | None]:
+        if z is None:
+            return None, None
+        shape = (2,) if np.ndim(z) == 1 else (None, 2)
+        echoes = as_array("z", z, shape, self._dtype, missing=True).reshape(-1, 2)
+        _require_moderate(echoes)
+        numbers = self._as_numbers(master, len(echoes))
+        there = ~np.isnan(echoes[:, 0])
+        echoes, numbers = echoes[there], numbers[there]
+        known = numbers[numbers != UNKNOWN_MASTER]
+        if len(np.unique(known)) < len(known):
+            raise ValueError(f"master names a master twice: {numbers.tolist()}")
+        if len(echoes) > MAX_MASTERS:
+            raise ValueError(f"z has {len(echoes)} echoes; at most {MAX_MASTERS} are taken at once")
+        return (echoes if len(echoes) else None), numbers
+
+    def _as_numbers(self, master: npt.ArrayLike | None, count: int) -> npt.NDArray[np.int64]:
+        masters = self._core_steps.masters
+        if master is None:
+            if masters > 1 and not self._unknown:
+                raise TypeError(f"master must be given: the filter has {masters} masters")
+            return np.full(count, UNKNOWN_MASTER if self._unknown else 0, np.int64)
+        raw = np.asarray(master)
+        if raw.dtype.kind not in "iu":
+            raise TypeError(f"master must be an int or an array of int, not of {raw.dtype.name}")
+        if raw.shape not in ((), (count,)):
+            raise ValueError(f"master has shape {raw.shape}, expected ({count},) as z has rows")
+        numbers = np.ascontiguousarray(np.broadcast_to(raw, (count,)), dtype=np.int64)
+        for number in np.unique(numbers):
+            if not UNKNOWN_MASTER <= number < masters:
+                raise ValueError(f"master is {number}, but the filter has {masters} masters")
+        return numbers
+
+
+class SlatFilter(Steps):
+    """What the filters of this package share; not for direct use.
+
+    One filter belongs to one thread at a time: a call while another thread is inside raises
+    ``RuntimeError``. Use a copy (``copy.deepcopy``) per thread; it goes on with the same random
+    numbers.
+    """
+
+    #: The parameters in the core, with their defaults.
+    _defaults: ClassVar[Mapping[str, Any]] = {}
+
+    _max_masters: int = MAX_MASTERS
+    _settings: dict[str, Any]  # what the constructor was given beside x0, P0, dtype and seed
+
+    def __init__(
+        self,
+        x0: npt.ArrayLike,
+        P0: npt.ArrayLike,
+        *,
+        motion: Motion,
+        sonar: Sonar,
+        dtype: npt.DTypeLike,
+        seed: int = 0,
+        **settings: Any,
+    ) -> None:
+        self._dtype = as_dtype(dtype)
+        self._motion = as_instance("motion", motion, (CompassMotion, UnicycleMotion))
+        self._sonar = as_instance("sonar", sonar, Sonar)
+        require_heading(self._sonar, self._motion)
+        self._settings = {**settings, **self._as_params(settings)}
+        seed = as_integer("seed", seed, 0, 2**64 - 1)
+        n = self._motion.pose_states
+        state = as_array("x0", x0, (n,), self._dtype)
+        covariance = as_covariance("P0", P0, n, self._dtype, definite=False)
+        self._prepare()
+        self._random = _core.Random(seed)
+        self._status = Status.ok
+        try:
+            self._core_steps.reset(state, covariance, self._random)
+        except _core.StatusError as error:
+            raise ValueError(f"x0, P0 or the parameters are refused: {error}") from None
+
+    def _prepare(self) -> None:
+        name = self._dtype.name
+        self._exclusive = Exclusive()
+        self._device = core_sonar(self._sonar, name)
+        params = {key: self._settings[key] for key in self._defaults}
+        require_range(params, name)
+        core = getattr(_core, f"Slat_{self._motion.name}_{name}")
+        self._core_steps = self._build(core, core_params(self._motion, name), params)
+
+    def _build(self, core: Any, motion: dict[str, Any], params: dict[str, Any]) -> Any:
+        """Make this filter in the core, of whose class ``core`` it is."""
+        raise NotImplementedError
+
+    def _description(self) -> dict[str, Any]:
+        models = {"motion": self._motion, "sonar": self._sonar, **self._settings}
+        described = {name: _state.describe(value) for name, value in models.items()}
+        return {"dtype": self._dtype.name, **described}
+
+    def __repr__(self) -> str:
+        x = np.array2string(self.x, precision=4, separator=", ")
+        return f"{type(self).__name__}(dtype={self._dtype.name}, masters={self.masters}, x={x})"
+
+    def mode_probabilities(self, n: int) -> Floats:
+        """Give the probabilities that master n goes straight, accelerates and turns, shape (3,).
+
+        Raises
+        ------
+        ValueError, TypeError
+            If there is no such master, or the master is not an :class:`~auvest.Imm`.
+        """
+        with self._exclusive:
+            number = self._as_master(n)
+            modes: Floats = np.array(self._core_steps.mode_probabilities(number), self._dtype)
+        if modes.size == 0:
+            raise ValueError("mode probabilities need an auvest.Imm as master")
+        return modes
+
+    def _reading(self, name: str) -> Any:
+        with self._exclusive:
+            return getattr(self._core_steps, name)
+
+    @property
+    def masters(self) -> int:
+        """Masters that the filter tracks."""
+        return int(self._reading("masters"))
+
+    @property
+    def log_likelihood(self) -> float:
+        """Logarithm of the density of all echoes since the start."""
+        return float(self._reading("log_likelihood"))
+
+    def add_master(self, x: npt.ArrayLike, P: npt.ArrayLike) -> int:
+        """Add a master that the filter knows.
+
+        Parameters
+        ----------
+        x : array_like, shape (6,)
+            ``[x, y, vx, vy, ax, ay]``, m, m/s, m/s^2.
+        P : array_like, shape (6, 6)
+            Covariance, symmetric positive definite.
+
+        Returns
+        -------
+        int
+            Its number, from 0.
+
+        Raises
+        ------
+        ValueError, TypeError
+            If an argument is wrong, or there are as many already as the filter takes.
+        """
+        state = as_array("x", x, (6,), self._dtype)
+        covariance = as_covariance("P", P, 6, self._dtype, definite=True)
+        with self._exclusive:
+            number: int = self._core_steps.masters
+            if number == self._max_masters:
+                raise ValueError(f"the filter has {number} masters already, that is all")
+            try:
+                self._core_steps.add_master(state, covariance)
+            except _core.StatusError as error:
+                if error.status != Status.not_positive_definite:
+                    raise ValueError(f"x and P are refused: {error}") from None
+                raise ValueError(f"P must be positive definite in {self._dtype.name}") from None
+        return number
+
+    def step(
+        self,
+        dt: float,
+        u: npt.ArrayLike,
+        z: npt.ArrayLike | None = None,
+        master: npt.ArrayLike | None = None,
+        *,
+        changes: npt.ArrayLike | None = None,
+        sonar: Sonar | None = None,
+    ) -> None:
+        """Predict and update at once: the same bits, faster, and both or neither is done.
+
+        Parameters and errors are those of :meth:`predict` and :meth:`update`.
+        """
+        move, heard = (dt, u, changes), (z, None if self._deaf else master)
+        device = self._as_device(sonar)
+        self._do(
+            "step",
+            (*move, *heard),
+            lambda: (*self._as_move(*move), *self._as_echoes(*heard)),
+            self._unknown,
+            device,
+            self._random,
+        )
+
+    def _as_params(self, given: Mapping[str, Any]) -> dict[str, Any]:
+        """Take values for ``_defaults``: flags, shares in 0..1, else numbers of at least 0."""
+        params: dict[str, Any] = {}
+        for name, default in self._defaults.items():
+            if isinstance(default, bool):
+                params[name] = as_flag(name, given[name])
+                continue
+            params[name] = as_number(name, given[name], "not negative")
+            if name in ("resample_below", "kept") and params[name] > 1:
+                raise ValueError(f"{name} must lie in 0..1, not {params[name]:g}")
+        return params
+
+
+class ParticleSlatFilter(SlatFilter):
+    """What :class:`Slatf` and :class:`SlatfJoint` share; not for direct use."""
+
+    @property
+    def particles(self) -> int:
+        """N."""
+        return int(self._settings["particles"])
+
+    @property
+    def effective_size(self) -> float:
+        """N_eff of the last update, Eq. (33), before any resampling; N before one."""
+        return float(self._reading("effective_size"))
+
+    @property
+    def resamplings(self) -> int:
+        """Resamplings since the start."""
+        return int(self._reading("resamplings"))
+
+    @property
+    def weights(self) -> Floats:
+        """Normalised weights of the particles, shape (N,), a copy."""
+        with self._exclusive:
+            weights: Floats = self._core_steps.particles()[0]
+        return weights
+
+    @property
+    def poses(self) -> Floats:
+        """Poses of the particles (:class:`SlatfJoint`: their means), shape (N, n), a copy."""
+        with self._exclusive:
+            poses: Floats = self._core_steps.particles()[1]
+        return poses
+
+
+def as_covariance(name: str, value: object, n: int, dtype: DType, *, definite: bool) -> Floats:
+    """Take a symmetric (n, n) array without negative eigenvalues, or with positive ones only."""
+    covariance = as_array(name, value, (n, n), dtype)
+    scale = float(np.abs(covariance).max())
+    if np.abs(covariance - covariance.T).max() > 1e-6 * scale:
+        raise ValueError(f"{name} must be symmetric")
+    smallest = float(np.linalg.eigvalsh(covariance.astype(np.float64))[0])
+    if definite and smallest <= 0:
+        raise ValueError(
+            f"{name} must be positive definite, but its smallest eigenvalue is {smallest:.3g}"
+        )
+    if smallest < -1e-6 * scale:
+        raise ValueError(f"{name} must not have negative eigenvalues, it has {smallest:.3g}")
+    return covariance
+
+
+def require_heading(sonar: Sonar, motion: Motion) -> None:
+    """Refuse a sonar that needs a heading where the pose has none."""
+    if sonar.bearing == "from_heading" and motion.pose_states < 3:
+        raise ValueError(
+            "sonar has the bearing 'from_heading', which needs a heading in the pose: "
+            "motion must be an auvest.UnicycleMotion"
+        )
+
+
+def _require_ascending(name: str, times: Floats) -> None:
+    back = np.flatnonzero(np.diff(times) < 0)
+    if back.size:
+        k = int(back[0]) + 1
+        raise ValueError(f"{name}[{k}] = {times[k]} lies before {name}[{k - 1}] = {times[k - 1]}")
+
+
+def _require_moderate(z: Floats) -> None:
+    far = np.argwhere(np.abs(np.nan_to_num(z)) > _LARGEST_Z)
+    if far.size:
+        row, column = (int(i) for i in far[0])
+        raise ValueError(f"z[{row}, {column}] is {z[row, column]}, beyond 1e9")

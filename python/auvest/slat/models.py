@@ -1,0 +1,282 @@
+"""What the filters of :mod:`auvest.slat` are made of: the slave's motion, the master, the sonar."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from functools import lru_cache
+from typing import Any, ClassVar, Literal, TypeAlias
+
+import numpy as np
+
+from auvest import _core
+from auvest._arguments import (
+    as_array,
+    as_flag,
+    as_instance,
+    as_kind,
+    as_number,
+    require_range,
+)
+from auvest.models import ConstantAcceleration
+
+_COMPASS = _core.compass_motion_defaults()
+_UNICYCLE = _core.unicycle_motion_defaults()
+_MASTER = _core.piecewise_acceleration_defaults()
+_IMM = _core.imm_defaults()
+_SONAR = _core.sonar_defaults()
+
+
+def _check_numbers(model: object, *names: str) -> None:
+    for name in names:
+        value = as_number(name, getattr(model, name), "not negative")
+        object.__setattr__(model, name, value)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CompassMotion:
+    """Dead reckoning from measured speed (m/s) and heading (rad), Eq. (2) of the SLATF paper.
+
+    The pose is ``[x, y]`` (m), the reading ``u = [speed, heading]``; measured = true + noise.
+
+    Parameters
+    ----------
+    sigma_speed_m_s, sigma_heading_rad : float
+        Standard deviations of one reading, not negative; the heading's at most 3.
+    compensate_bias : bool
+        A noisy heading shortens every displacement by ``exp(-sigma^2 / 2)`` on average: 4.4 % at
+        0.3 rad. True: that is made up for. False: as in the paper.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If an argument lies outside its range.
+    """
+
+    sigma_speed_m_s: float = _COMPASS["sigma_speed_m_s"]
+    sigma_heading_rad: float = _COMPASS["sigma_heading_rad"]
+    compensate_bias: bool = _COMPASS["compensate_bias"]
+
+    name: ClassVar[str] = "compass"
+    pose_states: ClassVar[int] = 2
+
+    def __post_init__(self) -> None:
+        _check_numbers(self, "sigma_speed_m_s", "sigma_heading_rad")
+        if self.sigma_heading_rad > 3:
+            raise ValueError(f"sigma_heading_rad must be at most 3, not {self.sigma_heading_rad}")
+        as_flag("compensate_bias", self.compensate_bias)
+
+
+@dataclass(frozen=True, kw_only=True)
+class UnicycleMotion:
+    """Dead reckoning from measured speed (m/s) and yaw rate (rad/s).
+
+    The pose is ``[x, y, heading]`` (m, rad), the reading ``u = [speed, yaw rate]``.
+
+    Parameters
+    ----------
+    sigma_speed_m_s, sigma_yaw_rate_rad_s : float
+        Standard deviations of one reading, not negative.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If an argument lies outside its range.
+    """
+
+    sigma_speed_m_s: float = _UNICYCLE["sigma_speed_m_s"]
+    sigma_yaw_rate_rad_s: float = _UNICYCLE["sigma_yaw_rate_rad_s"]
+
+    name: ClassVar[str] = "unicycle"
+    pose_states: ClassVar[int] = 3
+
+    def __post_init__(self) -> None:
+        _check_numbers(self, "sigma_speed_m_s", "sigma_yaw_rate_rad_s")
+
+
+Motion: TypeAlias = CompassMotion | UnicycleMotion
+
+
+@dataclass(frozen=True, kw_only=True)
+class PiecewiseAcceleration:
+    """A master with state ``[x, y, vx, vy, ax, ay]`` whose acceleration jumps at random, Eq. (4).
+
+    Parameters
+    ----------
+    acceleration_m_s2 : float
+        q, standard deviation of the jump of each prediction, m/s^2, not negative.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If the argument lies outside its range.
+    """
+
+    acceleration_m_s2: float = _MASTER["acceleration_m_s2"]
+
+    def __post_init__(self) -> None:
+        _check_numbers(self, "acceleration_m_s2")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConstantVelocity:
+    """A master that goes straight, state ``[x, y, vx, vy, ax, ay]``; one model of an :class:`Imm`.
+
+    Parameters
+    ----------
+    velocity_psd : float
+        Power spectral density of the white accelerations, m^2/s^3, not negative.
+    sigma_acceleration_m_s2 : float
+        Standard deviation of the acceleration that a manoeuvre begins with, m/s^2, not negative.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If an argument lies outside its range.
+    """
+
+    velocity_psd: float = _IMM["straight"]["velocity_psd"]
+    sigma_acceleration_m_s2: float = _IMM["straight"]["sigma_acceleration_m_s2"]
+
+    def __post_init__(self) -> None:
+        _check_numbers(self, "velocity_psd", "sigma_acceleration_m_s2")
+
+
+@dataclass(frozen=True, kw_only=True)
+class CoordinatedTurn:
+    """A master that turns at the rate ``(v x a) / |v|^2`` of its state; a model of an :class:`Imm`.
+
+    Parameters
+    ----------
+    position_psd, velocity_psd, acceleration_psd : float
+        Power spectral densities of the white noises that drive the three pairs of states, in
+        m^2/s, m^2/s^3 and m^2/s^5; not negative.
+    slow_m_s : float
+        Speed far below which a direction of motion cannot be told, m/s, positive.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If an argument lies outside its range.
+    """
+
+    position_psd: float = _IMM["turning"]["position_psd"]
+    velocity_psd: float = _IMM["turning"]["velocity_psd"]
+    acceleration_psd: float = _IMM["turning"]["acceleration_psd"]
+    slow_m_s: float = _IMM["turning"]["slow_m_s"]
+
+    def __post_init__(self) -> None:
+        _check_numbers(self, "position_psd", "velocity_psd", "acceleration_psd")
+        object.__setattr__(self, "slow_m_s", as_number("slow_m_s", self.slow_m_s, "positive"))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Imm:
+    """Interacting multiple models: a master whose manoeuvres nobody announces.
+
+    It goes straight, accelerates or turns. A motion is drawn anew ``switch_rate_hz`` times per
+    second on average, and is then each of the three as often as ``share`` says
+    (docs/algorithms/slatf.md).
+
+    Parameters
+    ----------
+    straight : ConstantVelocity
+    accelerated : ConstantAcceleration
+        With the discretisation "exact".
+    turning : CoordinatedTurn
+    share : (float, float, float)
+        Not negative, with sum 1.
+    switch_rate_hz : float
+        Not negative; 0: a master keeps its motion.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If an argument lies outside its range.
+    """
+
+    straight: ConstantVelocity = field(default_factory=ConstantVelocity)
+    accelerated: ConstantAcceleration = field(default_factory=ConstantAcceleration)
+    turning: CoordinatedTurn = field(default_factory=CoordinatedTurn)
+    share: tuple[float, float, float] = (1 / 3, 1 / 3, 1 / 3)
+    switch_rate_hz: float = _IMM["switch_rate_hz"]
+
+    def __post_init__(self) -> None:
+        as_instance("straight", self.straight, ConstantVelocity)
+        as_instance("accelerated", self.accelerated, ConstantAcceleration)
+        as_instance("turning", self.turning, CoordinatedTurn)
+        if self.accelerated.discretisation != "exact":
+            raise ValueError("accelerated must have the discretisation 'exact'")
+        share = as_array("share", self.share, (3,), np.dtype(np.float64))
+        if (share < 0).any() or abs(share.sum() - 1) > 1e-3:
+            raise ValueError(
+                f"share must be three numbers of at least 0 with sum 1, not {self.share}"
+            )
+        object.__setattr__(self, "share", tuple(float(part) for part in share))
+        _check_numbers(self, "switch_rate_hz")
+
+
+Master: TypeAlias = PiecewiseAcceleration | Imm
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sonar:
+    """Range (m) and bearing (rad) between slave and master, Eqs. (5) and (6).
+
+    Parameters
+    ----------
+    sigma_range_m, sigma_bearing_rad : float
+        Standard deviations, above 1e-6.
+    bearing : {"master_to_slave", "slave_to_master", "from_heading"}
+        Where the bearing points: from the x axis, from the master to the slave (the paper's), or
+        from the slave to the master; or from the slave's heading to the master, which needs a
+        heading in the pose (:class:`UnicycleMotion`).
+
+    Raises
+    ------
+    ValueError, TypeError
+        If an argument lies outside its range.
+    """
+
+    sigma_range_m: float = _SONAR["sigma_range_m"]
+    sigma_bearing_rad: float = _SONAR["sigma_bearing_rad"]
+    bearing: Literal["master_to_slave", "slave_to_master", "from_heading"] = "master_to_slave"
+
+    def __post_init__(self) -> None:
+        for name in ("sigma_range_m", "sigma_bearing_rad"):
+            value = as_number(name, getattr(self, name), "positive")
+            if value <= 1e-6:
+                raise ValueError(f"{name} must be above 1e-6, not {value}")
+            object.__setattr__(self, name, value)
+        as_kind("bearing", self.bearing, ("master_to_slave", "slave_to_master", "from_heading"))
+
+
+def core_master(master: Master, dtype: str) -> dict[str, Any]:
+    """Make the dict that the core takes for a master in this precision."""
+    if isinstance(master, PiecewiseAcceleration):
+        return core_params(master, dtype)
+    params: dict[str, Any] = asdict(master)
+    params["accelerated"].pop("discretisation")
+    rate = params["switch_rate_hz"]
+    for part in (
+        *(params[name] for name in ("straight", "accelerated", "turning")),
+        {"rate": rate},
+    ):
+        require_range(part, dtype)
+    return params
+
+
+def core_params(model: Motion | PiecewiseAcceleration, dtype: str) -> dict[str, Any]:
+    """Make the dict that the core takes for a model in this precision."""
+    params = asdict(model)
+    require_range(params, dtype, squared=tuple(params))
+    return params
+
+
+@lru_cache(maxsize=64)
+def core_sonar(model: Sonar, dtype: str) -> _core._Sonar:
+    """Build the core's sonar in this precision."""
+    params = asdict(model)
+    bearing = params.pop("bearing")
+    require_range(params, dtype, squared=tuple(params))
+    sonar: _core._Sonar = getattr(_core, f"Sonar_{dtype}")(params, bearing)
+    return sonar

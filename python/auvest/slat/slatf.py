@@ -1,0 +1,163 @@
+""":class:`Slatf`: SLATF 1.0 and 2.0 (Lu, Chen, Liu, Ma, He 2020)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from auvest import _core
+from auvest._arguments import DType, as_dtype, as_instance, as_integer, as_kind, as_number
+from auvest.slat._base import COMPASS, MASTER, SONAR, ParticleSlatFilter
+from auvest.slat.models import Imm, Master, Motion, PiecewiseAcceleration, Sonar, core_master
+
+#: Particles that a filter takes at most: 0.5 kB each in float32.
+MAX_PARTICLES = 10_000_000
+
+Lanes = Literal["scalar", "sse2", "avx2", "avx512"]
+Resampling = Literal["systematic", "stratified", "residual", "multinomial"]
+
+_DEFAULTS = _core.slatf_defaults()
+
+
+def available_lanes(dtype: npt.DTypeLike = "float32") -> tuple[str, ...]:
+    """Give the instruction sets in whose lanes particles can run here, the widest last.
+
+    The bits do not depend on the choice. In float64 particles run one by one.
+    """
+    return tuple(_core.slat_lanes(as_dtype(dtype) == np.dtype(np.float32)))
+
+
+class Slatf(ParticleSlatFilter):
+    """SLATF 1.0 and 2.0: a particle filter over the slave's pose with an EKF per master in each.
+
+    Parameters
+    ----------
+    x0 : array_like, shape (n,)
+        The slave's pose when communication breaks: ``[x, y]`` or ``[x, y, heading]``, m, rad.
+    P0 : array_like, shape (n, n)
+        Its covariance, from which particles are drawn; may be singular or zero.
+    version : {2, 1}
+        1: poses are drawn from the motion. 2: from motion and measurement.
+    particles : int
+        N, 1 to 10 million.
+    motion : CompassMotion or UnicycleMotion
+    master : PiecewiseAcceleration or Imm
+    sonar : Sonar
+    resampling : {"systematic", "stratified", "residual", "multinomial"}
+    resample_below : float
+        Resample where N_eff falls below this share of N, in 0..1, Eq. (33).
+    carry_covariance : bool
+        2.0 only: Eq. (50) to the letter, see docs/algorithms/slatf.md.
+    gate : float
+        An echo whose NIS (2 degrees of freedom) exceeds this in a particle says nothing to it;
+        0: no gate, as in the paper. 16 loses one good echo in 3,000.
+    birth_velocity_m_s, birth_acceleration_m_s2 : float
+        Standard deviations of a master that is born from an unknown echo, see the algorithm's
+        page; velocity 0: no births. Needs a gate.
+    lanes : {"scalar", "sse2", "avx2", "avx512"}, optional
+        Instruction set; default: the widest of :func:`available_lanes`. The bits are the same.
+    dtype : {"float64", "float32"}
+        Precision; float32 gives the bits of the filter on the vehicle.
+    seed : int
+        Of the filter's random numbers, 0 to 2^64 - 1.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If an argument is wrong; the message names it.
+    """
+
+    _defaults = _DEFAULTS
+
+    def __init__(
+        self,
+        x0: npt.ArrayLike,
+        P0: npt.ArrayLike,
+        *,
+        version: Literal[1, 2] = 2,
+        particles: int = 100,
+        motion: Motion = COMPASS,
+        master: Master = MASTER,
+        sonar: Sonar = SONAR,
+        resampling: Resampling = "systematic",
+        resample_below: float = _DEFAULTS["resample_below"],
+        carry_covariance: bool = _DEFAULTS["carry_covariance"],
+        gate: float = _DEFAULTS["gate"],
+        birth_velocity_m_s: float = _DEFAULTS["birth_velocity_m_s"],
+        birth_acceleration_m_s2: float = _DEFAULTS["birth_acceleration_m_s2"],
+        lanes: Lanes | None = None,
+        dtype: npt.DTypeLike = "float64",
+        seed: int = 1,
+    ) -> None:
+        particles = as_integer("particles", particles, 1, MAX_PARTICLES)
+        as_instance("master", master, (PiecewiseAcceleration, Imm))
+        as_kind("resampling", resampling, get_args(Resampling))
+        if isinstance(master, Imm):
+            as_kind("lanes", lanes or "scalar", ("scalar",))  # with an Imm particles run one by one
+            lanes = "scalar"
+        self._lanes = _as_lanes(lanes, as_dtype(dtype))
+        super().__init__(
+            x0,
+            P0,
+            motion=motion,
+            sonar=sonar,
+            dtype=dtype,
+            seed=seed,
+            version=as_integer("version", version, 1, 2),
+            particles=particles,
+            master=master,
+            resampling=resampling,
+            resample_below=resample_below,
+            carry_covariance=carry_covariance,
+            gate=gate,
+            birth_velocity_m_s=birth_velocity_m_s,
+            birth_acceleration_m_s2=birth_acceleration_m_s2,
+        )
+
+    def _as_params(self, given: Mapping[str, Any]) -> dict[str, Any]:
+        params = super()._as_params(given)
+        as_number("birth_acceleration_m_s2", params["birth_acceleration_m_s2"], "positive")
+        self._births = params["birth_velocity_m_s"] > 0
+        if self._births and params["gate"] == 0:
+            raise ValueError("birth_velocity_m_s needs a gate above 0: births are decided by it")
+        return params
+
+    def _build(self, core: Any, motion: dict[str, Any], params: dict[str, Any]) -> Any:
+        available = available_lanes(self._dtype)
+        if self._lanes not in available:  # pickled on a processor that has more
+            self._lanes = available[-1]
+        settings = self._settings
+        return core.slatf(
+            motion,
+            core_master(settings["master"], self._dtype.name),
+            params,
+            settings["resampling"],
+            settings["version"],
+            settings["particles"],
+            self._lanes,
+        )
+
+    @property
+    def version(self) -> int:
+        """1 or 2."""
+        return int(self._settings["version"])
+
+    @property
+    def lanes(self) -> str:
+        """The instruction set in whose lanes the particles run."""
+        return self._lanes
+
+
+def _as_lanes(lanes: str | None, dtype: DType) -> str:
+    available = available_lanes(dtype)
+    if lanes is None:
+        return available[-1]
+    as_kind("lanes", lanes, get_args(Lanes))
+    if lanes not in available:
+        raise ValueError(
+            f"lanes {lanes!r} do not run here in {dtype.name}; {', '.join(available)} do"
+        )
+    return lanes
