@@ -240,7 +240,7 @@ def test_reproduce_writes_page_and_json_with_the_defaults_of_measure(
     ]
     done = call(experiment, *output, "--runs", "3", "--json")
     document = json.loads(done.stdout)
-    assert document["command"] == "reproduce made_up"
+    assert document["command"] == "reproduce made-up"
     assert document["runs"] == 3
     assert document == json.loads((tmp_path / "results.json").read_text())
     assert call(experiment, *output, "--runs", "0").exit_code == 2

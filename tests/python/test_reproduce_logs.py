@@ -200,7 +200,7 @@ def made_up_recordings(data: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def perfect(tmp_path_factory: pytest.TempPathFactory) -> logs.Reproduction:
-    return logs.measure(made_up_recordings(tmp_path_factory.mktemp("recordings")))
+    return logs.measure(data=made_up_recordings(tmp_path_factory.mktemp("recordings")))
 
 
 def test_recordings_without_noise_are_followed(perfect: logs.Reproduction) -> None:

@@ -129,7 +129,7 @@ def judged(ekf_slat, slatf2):
         "slatf2": [figures(*one) for one in slatf2],
     }
     tracks = [track(10.0, 4), track(2.5, 3)]
-    return mrclam6.summary(tracks, runs, (0.25, 0.5), seed=3)
+    return mrclam6.summary(mrclam6.Reproduction(3, tracks, runs, {}, (0.25, 0.5)))
 
 
 def test_summary_by_hand():
