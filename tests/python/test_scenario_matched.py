@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -38,9 +40,8 @@ def test_a_filter_with_the_noise_of_the_world_is_consistent():
 def test_each_number_of_a_fix_has_its_own_noise(name):
     """Of one doubled sigma, and only of it, the NIS of a sure filter tells: 4 + 1 for 1 + 1."""
     still = auvest.ConstantAcceleration(position_psd=0.0, velocity_psd=0.0, acceleration_psd=1e-20)
-    world = auvest.RangeBearing(
-        **{**vars(SENSOR), name: 2 * getattr(SENSOR, name)}  # not what the filter takes it for
-    )
+    # Not what the filter takes it for.
+    world = dataclasses.replace(SENSOR, **{name: 2 * getattr(SENSOR, name)})
 
     def sure(x, p):
         return auvest.Ekf(x, p, process=still, sensors=SENSOR)
