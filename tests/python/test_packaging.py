@@ -78,9 +78,9 @@ def test_load_models_from_an_installed_wheel(wheel, root, tmp_path, run):
     run(python, "-m", "pip", "install", "--quiet", wheel)
     (tmp_path / "my_models.hpp").write_bytes((root / "cpp/examples/my_models.hpp").read_bytes())
     code = (
-        "import auvest\n"
+        "import auvest, numpy\n"
         "models = auvest.load_models('my_models.hpp')\n"
-        "ukf = auvest.Ukf([1, 2, 0, 0, 0, 0], [[float(i == j) for i in range(6)] for j in range(6)],"
+        "ukf = auvest.Ukf([1, 2, 0, 0, 0, 0], numpy.eye(6),"
         " process=models.MyAcceleration(), sensors=models.MyRangeBearing(), dtype='float32')\n"
         "ukf.predict(0.1)\n"
         "ukf.update([3, 0.5])\n"
