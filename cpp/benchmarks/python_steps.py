@@ -50,7 +50,7 @@ def auvest_range_filter() -> tuple[Any, list[Any]]:
         auvest.LeaderRange(leader=(float(x), float(y)), sigma_range_m=SIGMA_RANGE)
         for x, y in LEADERS
     ]
-    ekf = auvest.RobustEkf(START, START_P, process=process, kernel="unit", recovery=None)
+    ekf = auvest.Ekf(START, START_P, process=process)
     return ekf, sensors
 
 
@@ -65,7 +65,7 @@ def auvest_six_states() -> Any:
             velocity_psd=PSD[1],
             acceleration_psd=PSD[2],
         ),
-        measurement=auvest.RangeBearing(
+        sensors=auvest.RangeBearing(
             station=(float(STATION[0]), float(STATION[1])),
             sigma_range_m=SIGMA_UKF[0],
             sigma_bearing_rad=SIGMA_UKF[1],

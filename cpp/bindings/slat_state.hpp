@@ -46,7 +46,7 @@ class StateKeeper {
     count(set.size());
     const std::size_t more = static_cast<std::size_t>(set.size()) * (1 + Fields);
     state.numbers.reserve(state.numbers.size() + more);
-    for (int i = 0; i < set.size(); ++i) (*this)(set.log_weight(i));
+    for (int i = 0; i < set.size(); ++i) (*this)(set.log_weights()[i]);
     for (int i = 0; i < set.size(); ++i) {
       for (int field = 0; field < Fields; ++field) (*this)(*set.at(i, field));
     }

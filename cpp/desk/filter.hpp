@@ -196,8 +196,9 @@ class FilterFor final : public AnyFilter<Scalar> {
     typename Sensor::Measurement value = Sensor::Measurement::Zero();
     for (int i = 0; i < sensor->size; ++i) value(i) = z[i];
     Robust& robust = filter_;
+    const Scalar oldest = late_s_ * Scalar(1.00001);  // an age may be a sum that was rounded
+    if (age > oldest) return Report<Scalar>(Status::kTimeBackwards);
     if (late()) return memory_.update(robust, value, placed, age);
-    if (age != Scalar(0)) return Report<Scalar>(Status::kTimeBackwards);
     return robust.update(value, placed);
   }
 

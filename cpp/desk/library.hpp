@@ -49,7 +49,7 @@ class Library {
   template <class Process>
   void process(const char* name) {
     constexpr int kStates = Process::kStates;
-    if constexpr (CheckProcess<Process>::kComplete) {
+    if constexpr (CheckProcess<Process>::kComplete && check_params<Process>()) {
       add_process<Process>(catalogue_, prefix_ + name);
       if constexpr (!has_filters<Scalar>(kStates)) add_filters<kStates>(catalogue_);
       say("process", name, kStates, input_size<Process>(), 0, 0, propagates<Process>(),
@@ -59,7 +59,7 @@ class Library {
 
   template <class Model>
   void sensor(const char* name) {
-    if constexpr (CheckSensor<Model>::kComplete) {
+    if constexpr (CheckSensor<Model>::kComplete && check_params<Model>()) {
       add_sensor<Model>(catalogue_, prefix_ + name);
       say("sensor", name, Model::kStates, Model::kSize, Model::kObserved, Model::kPlace,
           has_H<Model>(), kStateNames_of<Model>(0), kMeasureNames_of<Model>(0));

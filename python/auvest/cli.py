@@ -1,8 +1,9 @@
 """The command line ``auvest``: the tree of commands. Each command is a module of its own.
 
-To add one: write ``commands/<verb>_<noun>.py`` with a function ``command`` and its ``HELP``, and
-put it into the table below with the line that stands first in its help and in that of its group.
-The module is imported when the command is called: ``auvest --help`` waits for none of them.
+To add one: write ``commands/<verb>_<noun>.py`` with a function ``command``, and put it into the
+table below with the line that stands first in its help and in that of its group. What the module's
+docstring says below its first line is the help, with examples. The module is imported when the
+command is called: ``auvest --help`` waits for none of them.
 """
 
 from __future__ import annotations
@@ -44,27 +45,31 @@ COMMANDS: Mapping[tuple[str, ...], tuple[str, str]] = {
         "Simulate range-only cooperative localisation and show errors, weights and consistency.",
     ),
     ("reproduce", "aukf"): (
-        "commands.reproduce_aukf",
+        "reproduce.aukf.command",
         "Reproduce the AUKF paper (Deng, Yin, Duan 2019): Figs 1 to 10 and every claim.",
     ),
     ("reproduce", "slatf"): (
-        "commands.reproduce_slatf",
+        "reproduce.slatf.command",
         "Reproduce the SLATF paper (Lu, Chen, Liu, Ma, He 2020): Table 1, Figs 2 to 6, all claims.",
     ),
     ("reproduce", "mekf"): (
-        "commands.reproduce_mekf",
+        "reproduce.mekf.command",
         "Reproduce the M-estimation EKF paper (Li, Du, Fan, Chen, Mao, Luo 2020): Figs 5 and 6.",
     ),
     ("reproduce", "intervals"): (
-        "commands.reproduce_intervals",
+        "reproduce.intervals.command",
         "Compare the interval policies at equal mean sampling rate.",
     ),
     ("reproduce", "logs"): (
-        "commands.reproduce_logs",
+        "reproduce.logs.command",
         "Replay the validation recordings and set the errors beside the targets.",
     ),
+    ("reproduce", "slat-cases"): (
+        "reproduce.slat_cases.command",
+        "Cases in which SlatfJoint and the IMM earn their place, and by how much.",
+    ),
     ("reproduce", "mrclam6"): (
-        "commands.reproduce_mrclam6",
+        "reproduce.mrclam6.command",
         "Track real robots that see each other, with one setting for all tracks.",
     ),
 }
@@ -121,7 +126,9 @@ def _lazy(module: str, line: str) -> type[TyperCommand]:
         def make_context(self, *arguments: Any, **options: Any) -> Any:
             found = import_module(f"auvest.{module}")
             real = typer.Typer(rich_markup_mode="rich", add_completion=False)
-            text = f"{line}\n\n{found.HELP}\n{EXIT_CODES}\n"
+            about = (found.__doc__ or "").partition("\n\n")[2]
+            about = about.replace("Examples\n--------\n", "Examples:\n\n")
+            text = f"{line}\n\n{about}\n{EXIT_CODES}\n"
             real.command(self.name, help=text)(found.command)
             return typer.main.get_command(real).make_context(*arguments, **options)
 

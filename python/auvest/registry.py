@@ -85,11 +85,11 @@ _EVERYWHERE = {"chip": True, "parity": True, "budget": True}
 _NO_RECORD = "no record of it is replayed on the targets yet"
 
 FILTERS: dict[str, Filter] = {
-    name: Filter(name=name, cls=cls, title=title, family=family, **where)
+    name: Filter(name=name, cls=cls, title=title, family=family, **where)  # type: ignore[arg-type]
     for name, cls, title, family, where in (
         ("ekf", "Ekf", "EKF", "gaussian", {"replay": True, **_EVERYWHERE}),
         ("ukf", "Ukf", "UKF", "gaussian", {"replay": True, **_EVERYWHERE}),
-        ("ckf", "Ckf", "CKF", "gaussian", {"chip": True, "parity": True}),
+        ("ckf", "Ckf", "CKF", "gaussian", {"replay": True, "chip": True, "parity": True}),
         ("aukf", "Aukf", "AUKF", "gaussian", {"replay": True, **_EVERYWHERE}),
         ("robust-ekf", "RobustEkf", "robust EKF", "gaussian", {"replay": True, **_EVERYWHERE}),
         (

@@ -1,6 +1,7 @@
 """The family of filters as its tests go through it: every kind, process and sensor, with a record.
 
-A new filter, process or sensor joins by being in ``auvest.filters``, ``PROCESSES`` or ``SENSORS``.
+A new filter joins by its line in the registry, a process or a sensor by being in ``PROCESSES`` or
+``SENSORS``.
 """
 
 from __future__ import annotations
@@ -10,20 +11,16 @@ import dataclasses
 import functools
 import itertools
 from collections.abc import Iterator
-from typing import Any, get_args, get_type_hints
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 
 import auvest
-import auvest.filters
 from auvest.models import PROCESSES, SENSORS
+from auvest.registry import FILTERS
 
 KINDS = tuple(
-    kind
-    for name in auvest.filters.__all__
-    if isinstance(kind := getattr(auvest.filters, name), type)
-    and issubclass(kind, auvest.filters.GaussianFilter)
-    and kind is not auvest.filters.GaussianFilter
+    getattr(auvest, entry.cls) for entry in FILTERS.values() if entry.family == "gaussian"
 )
 
 #: What the numbers of a record are, by the unit at the end of a name: a size and a deviation.
@@ -37,14 +34,23 @@ UNITS = {
 }
 
 
-def variants(model: type[auvest.ProcessModel]) -> Iterator[auvest.ProcessModel]:
+def variants(model: type[Any]) -> Iterator[Any]:
     """A model with each choice that makes it another class of the core."""
     hints = get_type_hints(model)
-    choices = [
-        (False, True) if hints[name] is bool else get_args(hints[name]) for name in model.structural
-    ]
-    for values in itertools.product(*choices):
-        yield model(**dict(zip(model.structural, values, strict=True)))
+    choices = {
+        name: (False, True) if hints[name] is bool else get_args(hints[name])
+        for name in model.structural
+        if hints[name] is bool or get_origin(hints[name]) is Literal
+    }
+    for values in itertools.product(*choices.values()):
+        yield model(**dict(zip(choices, values, strict=True)))
+
+
+def sensor_variants() -> Iterator[auvest.MeasurementModel]:
+    """Every sensor in every size."""
+    for model in SENSORS.values():
+        yield from variants(model)
+    yield auvest.Position(covariance_m2=[[1.0, 0.3, 0.1], [0.3, 2.0, -0.2], [0.1, -0.2, 0.5]])
 
 
 # ---- Models as functions, which a module names.
@@ -119,12 +125,12 @@ def of_unit(name: str) -> tuple[float, float]:
 def sensors_for(process: auvest.ProcessModel) -> dict[str, auvest.MeasurementModel]:
     """Every sensor that suits the process, the first of them twice."""
     found: dict[str, auvest.MeasurementModel] = {}
-    for name, model in SENSORS.items():
+    for model in sensor_variants():
         try:
-            model().check_process(process)
+            model.check_process(process)
         except ValueError:
             continue
-        found[name] = model()
+        found[model.core_name] = model
     if isinstance(process, auvest.FunctionProcess):
         found["fix"] = fix()
     assert found, f"no sensor suits {process}"
@@ -245,7 +251,7 @@ def cached_record(process: auvest.ProcessModel) -> Record:
         if k % 5 == 4:
             continue
         sigma = noise(model)
-        off = 100.0 if k % 7 == 3 or 40 <= k < 47 else 2.5 if k % 7 == 5 else 0.0
+        off = 12.0 if k % 7 == 3 or 40 <= k < 47 else 2.5 if k % 7 == 5 else 0.0
         z[k, : len(sigma)] = model.h(truth) + sigma * (off + rng.standard_normal(len(sigma)))
     return Record(z, dt, inputs, names, place)
 
@@ -263,14 +269,14 @@ def noise(model: auvest.MeasurementModel) -> np.ndarray:
 
 
 def place_size(model: auvest.MeasurementModel) -> int:
-    """How many coordinates say where the sensor stands."""
-    return 0 if model.place is None else int(np.size(getattr(model, model.place)))
+    """How many coordinates say where the sensor stands, or how."""
+    return 0 if model.place is None else np.size(getattr(model, model.place))
 
 
 def moved(model: auvest.MeasurementModel, place: np.ndarray) -> auvest.MeasurementModel:
     assert model.place is not None
-    value = float(place[0]) if len(place) == 1 else tuple(place.tolist())
-    return dataclasses.replace(model, **{model.place: value})
+    there = tuple(place.tolist()) if len(place) > 1 else float(place[0])
+    return dataclasses.replace(model, **{model.place: there})  # type: ignore[type-var]
 
 
 def row(f, width: int) -> dict[str, np.ndarray]:

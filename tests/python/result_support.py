@@ -49,7 +49,10 @@ def cooperative_result(error: Any, **columns: Any) -> cooperative.Result:
         "weight": np.full((runs, steps), np.nan),
         "samples": np.full(runs, steps),
         "recoveries": none,
+        "taken": none,
         "too_late": none,
+        "lost": none,
+        "overflowed": none,
         "status": np.zeros(runs, np.uint8),
     }
     return cooperative.Result(

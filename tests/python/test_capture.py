@@ -10,8 +10,10 @@ import itertools
 import json
 import math
 import os
+import select
 import signal
 import struct
+import subprocess
 import sys
 import termios
 import threading
@@ -230,10 +232,14 @@ class PortWithBoard:
         self.wait_until_open()
         script(self)
 
-    def wait_until_open(self) -> None:
+    def wait_until_open(self, process: subprocess.Popen[str] | None = None) -> None:
         """Whoever opens the port throws away what came before: return when that is done."""
-        while not os.read(self.master, 1)[0] & TIOCPKT_FLUSHREAD:
-            pass
+        opened = False
+        while not opened:
+            if select.select([self.master], [], [], 1.0)[0]:
+                opened = bool(os.read(self.master, 1)[0] & TIOCPKT_FLUSHREAD)
+            elif process is not None:
+                assert process.poll() is None, process.communicate()
         self._tell_of_flushes(False)
 
     def _tell_of_flushes(self, wanted: bool) -> None:
@@ -387,7 +393,7 @@ def test_interrupt_keeps_all_that_has_come(
     """Without --steps Ctrl-C is how a recording ends; with it, it is an interruption."""
     command = [sys.executable, "-m", "auvest", "capture", "--port", port.name, *steps]
     with start_program([*command, "--output", tmp_path, "--no-figure"]) as process:
-        port.wait_until_open()
+        port.wait_until_open(process)
         port.say(HEADER)
         for k in range(1, 4):
             port.say(sample_line(k))

@@ -16,7 +16,6 @@ from family_support import (
     ALL,
     BUILT_IN,
     CASES,
-    FUNCTIONS,
     KINDS,
     PRECISE_CASES,
     drive_elsewhere,
@@ -90,14 +89,15 @@ R = np.array([[0.04, 0.01], [0.01, 0.09]])
 
 
 def textbook(x, p, phi, q, h, r, z):
-    """One step of the Kalman filter as it is printed: x, P, innovation, S."""
+    """One step of the Kalman filter, in the form of Joseph: x, P, innovation, S."""
     x, p = phi @ x, phi @ p @ phi.T + q
     s = h @ p @ h.T + r
     if np.isnan(z).any():
         return x, p, np.full(len(z), np.nan), np.full(s.shape, np.nan)
-    gain = p @ h.T @ np.linalg.inv(s)
+    gain = np.linalg.solve(s, h @ p).T
     innovation = z - h @ x
-    return x + gain @ innovation, p - gain @ s @ gain.T, innovation, s
+    rest = np.eye(len(x)) - gain @ h
+    return x + gain @ innovation, rest @ p @ rest.T + gain @ r @ gain.T, innovation, s
 
 
 @pytest.mark.parametrize("process", LINEAR)
@@ -122,10 +122,28 @@ def test_a_linear_model_gives_the_kalman_filter(kind, process):
         assert (np.abs(result.x[k] - x) / (size + sigma)).max() < 1e-10
         assert (np.abs(result.P[k] - p) / np.outer(sigma, sigma)).max() < 1e-10
         np.testing.assert_allclose(result.innovation[k], innovation, rtol=0, atol=1e-9)
-        np.testing.assert_allclose(result.S[k], s, rtol=1e-10)
+        np.testing.assert_allclose(result.S[k], s, rtol=0, atol=1e-10)
         if not np.isnan(z[k, 0]):
             nis = innovation @ np.linalg.solve(s, innovation)
             assert result.nis[k] == pytest.approx(nis, rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_fixes_of_the_position_give_the_kalman_filter(kind):
+    """In space, with a covariance that is no diagonal, by the built-in models."""
+    model = auvest.WhiteAcceleration(axes=3)
+    r = np.array([[1.0, 0.3, 0.1], [0.3, 2.0, -0.2], [0.1, -0.2, 0.5]])
+    h = np.eye(3, 6)
+    x, p = start(model)
+    f = kind(x, p, process=model, sensors=auvest.Position(covariance_m2=r), **PLAIN)
+    for z in x[:3] + np.random.default_rng(5).multivariate_normal(np.zeros(3), r, 60):
+        f.predict(0.5)
+        f.update(z)
+        x, p, innovation, s = textbook(x, p, model.Phi(0.5), model.Q(0.5), h, r, z)
+        np.testing.assert_allclose(f.x, x, rtol=1e-10)
+        np.testing.assert_allclose(f.P, p, rtol=0, atol=1e-10)
+        np.testing.assert_allclose(f.innovation, innovation, rtol=0, atol=1e-10)
+        np.testing.assert_allclose(f.S, s, rtol=1e-10)
 
 
 @pytest.mark.parametrize("measured", [1, 2, 4])
@@ -136,7 +154,7 @@ def test_a_linear_model_of_any_size_gives_the_kalman_filter(kind, states, measur
     a = np.eye(states) + 0.1 * rng.standard_normal((states, states))
     h = rng.standard_normal((measured, states))
     q, r = 0.1 * np.eye(states), np.diag(0.1 + rng.random(measured))
-    process = auvest.FunctionProcess(lambda x, dt: a @ x, q, state=states)
+    process = auvest.FunctionProcess(lambda x, _: a @ x, q, state=states)
     sensor = auvest.FunctionSensor(lambda x: h @ x, r)
     x, p = np.zeros(states), np.eye(states)
     f = kind(x, p, process=process, sensors=sensor, **PLAIN)
@@ -144,10 +162,11 @@ def test_a_linear_model_of_any_size_gives_the_kalman_filter(kind, states, measur
         f.predict(0.5)
         f.update(z)
         x, p, innovation, s = textbook(x, p, a, 0.5 * q, h, r, z)
-        np.testing.assert_allclose(f.x, x, rtol=0, atol=1e-10)
-        np.testing.assert_allclose(f.P, p, rtol=0, atol=1e-10)
-        np.testing.assert_allclose(f.innovation, innovation, rtol=0, atol=1e-10)
-        np.testing.assert_allclose(f.S, s, rtol=0, atol=1e-10)
+        sigma, scale = np.sqrt(np.diag(p)), np.sqrt(np.diag(s))
+        assert (np.abs(f.x - x) / sigma).max() < 1e-10
+        assert (np.abs(f.P - p) / np.outer(sigma, sigma)).max() < 1e-10
+        assert (np.abs(f.innovation - innovation) / scale).max() < 1e-10
+        assert (np.abs(f.S - s) / np.outer(scale, scale)).max() < 1e-10
 
 
 # ---- Records.
@@ -199,13 +218,11 @@ def test_missing_rows_only_predict(kind, name, dtype):
 
 @pytest.mark.parametrize(("kind", "name", "dtype"), PRECISE_CASES)
 def test_a_place_is_that_of_a_model_that_stands_there(kind, name, dtype):
-    rows = record(ALL[name])
     for sensor, model in sensors_for(ALL[name]).items():
         if place_size(model) == 0:
             continue
         there = np.array([11.0, -7.0, 2.0])[: place_size(model)]
-        k = next(k for k, known in enumerate(rows.sensor) if known == sensor)
-        z = rows.z[k, : len(model.measures)]
+        z = moved(model, there).h(start(ALL[name])[0])
         a, b, c = (make(kind, name, dtype) for _ in range(3))
         a.update(z, sensor, place=there)
         b.update(z, moved(model, there))
@@ -232,7 +249,9 @@ def test_a_record_may_be_split_and_go_without_covariances(kind, name, dtype):
 @pytest.mark.parametrize(("kind", "name"), [(k, n) for k, n in CASES if n in BUILT_IN])
 def test_float32_rounds_what_float64_does(kind, name):
     rows = record(ALL[name])
-    single, double = (rows.run(make(kind, name, dtype)) for dtype in ("float32", "float64"))
+    single, double = (
+        rows.run(make(kind, name, dtype, **PLAIN)) for dtype in ("float32", "float64")
+    )
     for column in double.columns:
         if double[column].dtype == np.float64:
             assert single[column].dtype == np.float32, column
@@ -245,7 +264,7 @@ def test_float32_rounds_what_float64_does(kind, name):
 
 
 def lateness(rows, delay):
-    """For each row the row at whose end its measurement arrives: rows with k % 4 in (1, 2) later."""
+    """For each row that at whose end its measurement arrives: later where k % 4 is 1 or 2."""
     return [min(k + delay, len(rows) - 1) if k % 4 in (1, 2) else k for k in range(len(rows))]
 
 
@@ -289,7 +308,7 @@ def test_a_record_with_late_rows_is_the_record_in_time(kind, name, dtype):
     shifted.age_s[after] = rows.dt[after]
     options = {"kernel": "igg", "recovery": auvest.RejectionStreak(rejections=2)}
     a = rows.run(make(kind, name, dtype, **options))
-    b = shifted.run(make(kind, name, dtype, late_s=0.75, **options))
+    b = shifted.run(make(kind, name, dtype, late_s=1.0, **options))
     assert not b.too_late.any()
     again = [k for k in range(len(rows)) if k not in range(4, 30, 4)]
     assert same_bits(a.x[again], b.x[again])
@@ -363,10 +382,15 @@ def late_events(f, rows):
         f.update(z, rows.sensor[0], place=np.ones(3)[: place_size(first)], age_s=1.0)
 
 
+def failed(f, rows):
+    with pytest.raises(FilterError):
+        overflow(f, rows)
+
+
 SITUATIONS = {
-    "fresh": ({}, lambda f, rows: None),
-    "under way": ({}, lambda f, rows: rows[:20].drive(f)),
-    "after an error": ({}, lambda f, rows: pytest.raises(FilterError, overflow, f, rows)),
+    "fresh": ({}, lambda *_: None),
+    "under way": ({}, lambda f, rows: rows[:19].drive(f)),
+    "after an error": ({}, failed),
     "streak": (
         {"kernel": "igg", "recovery": auvest.RejectionStreak(rejections=2)},
         streak,
@@ -493,12 +517,12 @@ REFUSALS = {
         "dt must be a number, not str",
     ),
     "input long": (
-        lambda f, r: f.predict(1.0, np.ones(9)),
+        lambda f, _: f.predict(1.0, np.ones(9)),
         (ValueError, TypeError),
         r"input has shape \(9,\), expected|input must be None: \w+ has no input",
     ),
     "input NaN": (
-        lambda f, r: f.predict(1.0, np.full(len(f.process.input), NAN)),
+        lambda f, _: f.predict(1.0, np.full(len(f.process.input), NAN)),
         (ValueError, TypeError),
         r"input\[0\] is nan|input must be None",
     ),
@@ -623,7 +647,7 @@ REFUSALS = {
         TypeError,
         "covariance must be True or",
     ),
-    "restore": (lambda f, r: f.restore(b"auvest"), ValueError, "state is not from save"),
+    "restore": (lambda f, _: f.restore(b"auvest"), ValueError, "state is not from save"),
 }
 #: As above, of the core: the status is what it said, and all else as it was.
 FAILURES = {
@@ -645,7 +669,6 @@ def test_a_refusal_changes_nothing(kind, name, dtype):
     for refusal, (call, error, message) in REFUSALS.items():
         with pytest.raises(error, match=message) as caught:
             call(f, rows)
-            pytest.fail(refusal)
         assert not isinstance(caught.value, FilterError), refusal
         assert everything(f) == before, refusal
 
@@ -670,7 +693,7 @@ def test_a_row_that_fails_leaves_the_filter_at_the_row_before(kind, name, dtype)
     rows = record(ALL[name])
     a, b = (make(kind, name, dtype, late_s=2.0) for _ in range(2))
     rows.z[12] = np.where(np.isnan(rows.z[12]), np.nan, np.finfo(dtype).max)
-    with pytest.raises(FilterError, match="run at row 12: .*not be finite") as caught:
+    with pytest.raises(FilterError, match=r"run at row 12: .*not be finite") as caught:
         rows.run(a)
     wanted = rows[:12].run(b)
     require_same(caught.value.partial, wanted)
@@ -697,7 +720,7 @@ def test_wrong_constructions_name_the_argument(kind, name):
         x0,
         np.ones((n, n + 1)),
     )
-    require(ValueError, r"P0\[0, 0\] is -", x0, -p0)
+    require(ValueError, r"P0\[\d, \d\] is -", x0, -p0)
     require(TypeError, r"process must be an auvest\.ProcessModel, not str", process="line")
     require(TypeError, "sensors must be a measurement model, a sequence", sensors=3)
     require(ValueError, "dtype must be 'float32' or 'float64', not 'half'", dtype="half")
@@ -721,7 +744,7 @@ def test_wrong_constructions_name_the_argument(kind, name):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_sensor_that_sees_other_states_is_refused(kind):
-    nameless = auvest.FunctionProcess(lambda x, dt: x, np.eye(2), state=2)
+    nameless = auvest.FunctionProcess(lambda x, _: x, np.eye(2), state=2)
     message = (
         "RangeBearing observes x_m, y_m, but the state of FunctionProcess begins with x_0, x_1"
     )
@@ -737,17 +760,20 @@ def test_a_sensor_that_sees_other_states_is_refused(kind):
 # ---- Threads.
 
 
+INSIDE, LEAVE = threading.Event(), threading.Event()
+
+
+def held(x):
+    INSIDE.set()
+    assert LEAVE.wait(60)
+    return x[:2]
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_second_thread_is_refused_and_disturbs_nothing(kind):
     """The sensor's function holds one thread inside while the other tries everything."""
-    inside, leave = threading.Event(), threading.Event()
-
-    def h(x):
-        inside.set()
-        assert leave.wait(60)
-        return x[:2]
-
-    sensor = auvest.FunctionSensor(h, np.eye(2))
+    LEAVE.set()
+    sensor = auvest.FunctionSensor(held, np.eye(2))
     x0, p0 = start(ALL["ExactAcceleration"])
     f = kind(x0, p0, process=ALL["ExactAcceleration"], sensors=sensor)
     other = kind(x0, p0, process=ALL["ExactAcceleration"], sensors=sensor)
@@ -775,18 +801,17 @@ def test_a_second_thread_is_refused_and_disturbs_nothing(kind):
     with ThreadPoolExecutor(1) as pool:
         try:
             for action in (lambda: f.update([40.5, 31.0]), lambda: f.run([[40.5, 31.0]], dt=0.5)):
-                inside.clear()
-                leave.clear()
+                INSIDE.clear()
+                LEAVE.clear()
                 future = pool.submit(action)
-                assert inside.wait(60)
-                for name, attempt in attempts.items():
+                assert INSIDE.wait(60)
+                for attempt in attempts.values():
                     with pytest.raises(RuntimeError, match="in use by another thread"):
                         attempt()
-                        pytest.fail(name)
-                leave.set()
+                LEAVE.set()
                 future.result(60)
         finally:
-            leave.set()
+            LEAVE.set()
     other.update([40.5, 31.0])
     other.run([[40.5, 31.0]], dt=0.5)
     assert readable(f) == readable(other)
@@ -808,18 +833,18 @@ def test_one_filter_per_thread_agrees(kind, name, dtype):
 
 
 def test_odometry_with_ranges_robust_adaptive_and_late():
-    """A pose by odometry, ranges to a leader, a budget for the position: all at once."""
-    process = auvest.Odometry(sigma_distance=0.05, sigma_drift=0.02, sigma_turn=0.01)
+    """A pose by odometry, ranges to a leader and fixes, a budget for the position: all at once."""
+    process = auvest.Odometry(sigma_distance=0.05, sigma_drift=0.3, sigma_turn=0.01)
     f = auvest.Ukf(
         [0.0, 0.0, 0.0],
         np.diag([0.04, 0.04, 0.01]),
         process=process,
         sensors={
             "leader": auvest.LeaderRange(leader=(60.0, 10.0), sigma_range_m=0.3),
-            "buoy": auvest.LeaderRange(leader=(-20.0, 50.0), sigma_range_m=0.3),
+            "gps": auvest.Position(covariance_m2=[[0.5, 0.1], [0.1, 0.4]]),
         },
         kernel="huber",
-        policy=auvest.CovarianceBudget(position_sigma_m=0.6, min_s=0.25, max_s=4.0),
+        policy=auvest.CovarianceBudget(position_sigma_m=1.2, min_s=0.25, max_s=4.0),
         late_s=3,
     )
     in_time = copy.copy(f)
@@ -830,11 +855,10 @@ def test_odometry_with_ranges_robust_adaptive_and_late():
         dt = f.interval
         motion = np.array([1.2 * dt, 0.0, 0.05 * dt])
         truth = process.f(truth, dt, motion)
-        noisy = motion + np.array(
-            [0.05 * 1.2 * dt, 0.02 * dt**0.5, 0.01 * dt**0.5]
-        ) * rng.standard_normal(3)
-        name = ("leader", "buoy")[k % 2]
-        z = f.sensors[name].h(truth)[0] + 0.3 * rng.standard_normal()
+        sigma = np.array([0.3 * dt**0.5, 0.3 * dt**0.5, 0.01 * dt**0.5])
+        noisy = motion + sigma * rng.standard_normal(3)
+        name = ("leader", "gps")[k % 2]
+        z = f.sensors[name].h(truth) + 0.3 * rng.standard_normal(1 + k % 2)
         if k % 9 == 4:
             z += 15.0
         for g in (f, in_time):
@@ -848,7 +872,7 @@ def test_odometry_with_ranges_robust_adaptive_and_late():
         else:
             for g in (f, in_time):
                 g.update(z, name)
-        weights.append(f.report.weight[0])
+        weights.append(f.report.weight.min())
         for g in (f, in_time):
             g.feedback()
         intervals.append(f.interval)
@@ -878,7 +902,7 @@ def test_an_adaptive_filter_may_be_robust():
             z = np.array([np.hypot(*offset), np.arctan2(offset[1], offset[0])])
             z[0] += 3.0 if k % 10 == 5 else 0.0
             f.update(z)
-            outliers += f.report.decision == auvest.Decision.rejected
+            outliers += f.report.weight[0] == 0
             interval = f.feedback(position)
             assert 0 < interval <= f.policy.max_s
             worst = max(worst, float(np.hypot(*(f.x[:2] - position))))

@@ -868,7 +868,7 @@ def test_packaged_settings_have_one_kernel(name: str) -> None:
         ("[ranges]\nsigma_m = '1'", r"\[ranges\] sigma_m must be a number, not str"),
         ("[log]\nlate_s = -1", r"\[log\] late_s must not be negative"),
         ("[log]\nlate_s = inf", r"\[log\] late_s must be finite"),
-        ("[filter]\nkind = 'kf'", r"\[filter\] kind must be one of 'ekf', 'robust-ekf'"),
+        ("[filter]\nkind = 'kf'", r"\[filter\] kind must be one of 'ekf', 'ukf'"),
         ("[filter]\nkernel = 'cauchy'", r"\[filter\] kernel must be one of 'huber'"),
         ("ranges = 3", r"\[ranges\] must be a section"),
         ("[ranges", "is not TOML"),

@@ -1,4 +1,4 @@
-"""``auvest reproduce aukf``: what issue 2 asks of it, and that the committed page is its output."""
+"""``auvest reproduce aukf``: its claims, and that the committed page is its output."""
 
 from __future__ import annotations
 
@@ -15,8 +15,10 @@ from typer.testing import CliRunner
 
 from auvest import Aukf, MahalanobisInterval
 from auvest.cli import app
-from auvest.commands import reproduce_aukf
-from auvest.reproduce import aukf, aukf_page
+from auvest.commands import reproduce
+from auvest.commands.console import to_json
+from auvest.reproduce.aukf import claims as aukf_claims
+from auvest.reproduce.aukf import measure as aukf
 from auvest.reproduce.markdown import fill, number, table
 from auvest.scenarios.paper_aukf import (
     ASSUMPTIONS,
@@ -146,7 +148,7 @@ def test_claims_cover_every_figure(output: dict[str, Any]) -> None:
 
 def test_verdicts_follow_the_numbers(small: aukf.Reproduction) -> None:
     def verdict(result: aukf.Reproduction, where: str) -> str:
-        return next(c.verdict for c in aukf_page.claims(result) if c.where == where)
+        return next(c.verdict for c in aukf_claims.claims(result) if c.where == where)
 
     case = small.noises["normal"]
     swapped = aukf.Comparison(
@@ -158,9 +160,9 @@ def test_verdicts_follow_the_numbers(small: aukf.Reproduction) -> None:
         ekf=case.ekf,
     )
     other = aukf.Reproduction(**{**vars(small), "noises": {**small.noises, "normal": swapped}})
-    assert verdict(small, "3.4, Fig. 9") == aukf_page.NO
-    assert verdict(other, "3.4, Fig. 9") == aukf_page.YES
-    assert verdict(other, "3.2, Fig. 3") == aukf_page.NO
+    assert verdict(small, "3.4, Fig. 9") == aukf_claims.NO
+    assert verdict(other, "3.4, Fig. 9") == aukf_claims.YES
+    assert verdict(other, "3.2, Fig. 3") == aukf_claims.NO
 
 
 @pytest.mark.parametrize("name", ["README.md", *(f"{stem}.csv" for stem in FIGURES)])
@@ -237,9 +239,7 @@ def test_the_page_names_assumptions_and_findings(output: dict[str, Any], folder:
 
 def test_workers_do_not_change_the_numbers(small: aukf.Reproduction) -> None:
     again = aukf.measure(runs=6, seed=3, workers=1)
-    assert reproduce_aukf.console.to_json(aukf.summary(again)) == reproduce_aukf.console.to_json(
-        aukf.summary(small)
-    )
+    assert to_json(aukf.summary(again)) == to_json(aukf.summary(small))
 
 
 def test_progress_ends_with_everything_done() -> None:
@@ -262,7 +262,7 @@ def test_interrupt_keeps_what_is_written(tmp_path: Path, monkeypatch: pytest.Mon
     def interrupted(*_: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(reproduce_aukf, "draw_figures", interrupted)
+    monkeypatch.setattr(reproduce, "save_figures", interrupted)
     arguments = ["reproduce", "aukf", "--runs", "2", "--json", "--output", str(tmp_path)]
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == 130
@@ -394,7 +394,7 @@ def test_failed_runs_end_with_exit_code_1(tmp_path: Path, monkeypatch: pytest.Mo
         return result
 
     monkeypatch.setattr(aukf, "simulate", failing)
-    monkeypatch.setattr(reproduce_aukf, "draw_figures", lambda *_: None)
+    monkeypatch.setattr(reproduce, "save_figures", lambda *_: None)
     arguments = ["reproduce", "aukf", "--runs", "2", "--json", "--output", str(tmp_path)]
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == 1

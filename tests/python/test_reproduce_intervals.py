@@ -11,7 +11,8 @@ from result_support import tracking_result
 from typer.testing import CliRunner
 
 from auvest.cli import app
-from auvest.reproduce import intervals
+from auvest.reproduce.intervals import measure as intervals
+from auvest.reproduce.intervals.page import page
 
 PAGE = ROOT / "docs" / "reproduction" / "intervals"
 
@@ -90,7 +91,8 @@ def test_summary_and_page_say_what_the_cases_are():
     good = point("normal", (0.1, 0.02), (0.12, 0.08), (0.13, 0.09))
     close = point("uniform", (0.1, 0.02), (0.12, 0.03), (0.13, 0.09))
     bad = point("lognormal", (0.15, 0.04), (0.12, 0.03), (0.13, 0.04))
-    cases = intervals.summary([good, close, bad], runs=7, seed=9)["cases"]
+    result = intervals.Reproduction(7, 9, [good, close, bad])
+    cases = intervals.summary(result)["cases"]
     assert [c["dominates"] for c in cases] == [True, True, False]
     assert [c["less_time_above"] for c in cases] == [True, True, False]
     assert cases[2]["rmse_over_best"] == pytest.approx(1.25)
@@ -99,7 +101,7 @@ def test_summary_and_page_say_what_the_cases_are():
         for failed, name in enumerate(intervals.POLICIES):
             assert c[name]["samples_per_s"] == pytest.approx(2.5)
             assert c[name]["failed_runs"] == failed
-    words = " ".join(intervals.page([good, close, bad], runs=7, seed=9).split())
+    words = " ".join(page(result).split())
     assert "in 2 of 3 points, in 2 of the 2 with normal or uniform noise" in words
     assert "has less time above in 2 of 3." in words
     # 6 % is more than two standard errors of 1.4 %, 1 % is not.
@@ -148,8 +150,8 @@ def test_committed_page_is_that_of_the_committed_results(committed):
         )
         for c in committed["cases"]
     ]
-    page = intervals.page(cases, runs=committed["runs"], seed=committed["seed"])
-    assert page == (PAGE / "README.md").read_text()
+    result = intervals.Reproduction(committed["runs"], committed["seed"], cases)
+    assert page(result) == (PAGE / "README.md").read_text()
     assert (PAGE / "intervals.png").stat().st_size > 10_000
 
 

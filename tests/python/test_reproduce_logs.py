@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 from dataclasses import replace
@@ -16,7 +17,7 @@ from auvest.cli import app
 from auvest.logs import LogFolder
 from auvest.logs.importers import IMPORTERS
 from auvest.replay import find_settings, replay, settings_from
-from auvest.reproduce import logs
+from auvest.reproduce.logs import measure as logs
 
 DATA = os.environ.get("AUVEST_DATA")
 needs_data = pytest.mark.skipif(
@@ -27,7 +28,7 @@ needs_data = pytest.mark.skipif(
 @pytest.fixture(scope="module")
 def result() -> logs.Reproduction:
     assert DATA is not None
-    return logs.measure(Path(DATA))
+    return logs.measure(data=Path(DATA))
 
 
 @needs_data
@@ -102,7 +103,7 @@ def test_settings_from_the_record_alone(result: logs.Reproduction) -> None:
 def test_command_and_page(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, result: logs.Reproduction
 ) -> None:
-    monkeypatch.setattr(logs, "measure", lambda *_: result)
+    monkeypatch.setattr(logs, "measure", functools.wraps(logs.measure)(lambda **_: result))
     done = CliRunner().invoke(
         app, ["reproduce", "logs", "--data", str(DATA), "--output", str(tmp_path), "--json"]
     )
@@ -199,7 +200,7 @@ def made_up_recordings(data: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def perfect(tmp_path_factory: pytest.TempPathFactory) -> logs.Reproduction:
-    return logs.measure(made_up_recordings(tmp_path_factory.mktemp("recordings")))
+    return logs.measure(data=made_up_recordings(tmp_path_factory.mktemp("recordings")))
 
 
 def test_recordings_without_noise_are_followed(perfect: logs.Reproduction) -> None:

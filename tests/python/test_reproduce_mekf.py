@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import re
 
@@ -13,7 +14,8 @@ from typer.testing import CliRunner
 
 from auvest import metrics
 from auvest.cli import app
-from auvest.reproduce import mekf, mekf_page
+from auvest.reproduce.mekf import claims as mekf_page
+from auvest.reproduce.mekf import measure as mekf
 from auvest.scenarios import cooperative
 
 PAGE = ROOT / "docs" / "reproduction" / "mekf"
@@ -74,13 +76,12 @@ def test_reproduce_writes_its_files_and_one_json_object(tmp_path, monkeypatch):
     monkeypatch.setattr(mekf, "CONSISTENCY_STEPS", 60)
     monkeypatch.setattr(mekf, "DISPLACED_STEPS", 60)
     measure = mekf.measure
-    monkeypatch.setattr(
-        mekf,
-        "measure",
-        lambda **options: measure(
-            **options, steps=300, consistency_runs=4, displaced_runs=mekf.DIRECTIONS
-        ),
-    )
+
+    @functools.wraps(measure)  # the command takes its options from the signature
+    def small(**options):
+        return measure(**options, steps=300, consistency_runs=4, displaced_runs=mekf.DIRECTIONS)
+
+    monkeypatch.setattr(mekf, "measure", small)
     arguments = ["reproduce", "mekf", "--runs", "2", "--output", str(tmp_path), "--json"]
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == 0, result.output

@@ -11,7 +11,8 @@ from conftest import ROOT
 from typer.testing import CliRunner
 
 from auvest.cli import app
-from auvest.reproduce import mrclam6
+from auvest.reproduce.mrclam6 import measure as mrclam6
+from auvest.reproduce.mrclam6.page import page_of
 
 PAGE = ROOT / "docs" / "reproduction" / "mrclam6"
 DATA = os.environ.get("AUVEST_DATA")
@@ -72,7 +73,7 @@ def test_filters_follow_without_noise(folder):
     # With readings and sightings that are exact, errors lie below what their noise would give.
     drift_m = mrclam6.SPEED_DENSITY * math.sqrt(track.time_s[-1] - track.time_s[0])
     for name in mrclam6.NAMES:
-        figures = mrclam6.measure([track], [mrclam6.follow(track, name)])
+        figures = mrclam6.compare([track], [mrclam6.follow(track, name)])
         if name == "dead_reckoning":
             assert figures.slave_m < 1e-5
         else:
@@ -99,7 +100,7 @@ def test_rmse_by_hand():
     ] * 2  # fmt: skip
     off = mrclam6.Path2D(slave=np.full((2, 2), 3.0), master=np.full((2, 2), 4.0))
     on = mrclam6.Path2D(slave=np.zeros((2, 2)), master=np.zeros((2, 2)))
-    figures = mrclam6.measure(tracks, [off, on])
+    figures = mrclam6.compare(tracks, [off, on])
     assert figures.slave_m == pytest.approx(3)  # sqrt((18 + 0) / 2)
     assert figures.relative_m == pytest.approx(1)
     assert figures.slave_tracks_m == pytest.approx(math.sqrt(18) / 2)
@@ -128,7 +129,7 @@ def judged(ekf_slat, slatf2):
         "slatf2": [figures(*one) for one in slatf2],
     }
     tracks = [track(10.0, 4), track(2.5, 3)]
-    return mrclam6.summary(tracks, runs, (0.25, 0.5), seed=3)
+    return mrclam6.summary(mrclam6.Reproduction(3, tracks, runs, {}, (0.25, 0.5)))
 
 
 def test_summary_by_hand():
@@ -171,12 +172,12 @@ def test_command_on_a_made_up_recording(folder, tmp_path):
     assert results["tracks"] == 2
     assert [row["filter"] for row in results["filters"]] == list(mrclam6.NAMES)
     assert (output / "tracks.png").stat().st_size > 10_000
-    assert (output / "README.md").read_text() == mrclam6.page(results)
+    assert (output / "README.md").read_text() == page_of(results)
 
 
 @pytest.mark.parametrize(
     ("arguments", "says"),
-    [([], "--data is missing"), (["--data", "nowhere"], "groundtruth.csv is missing")],
+    [([], "Missing option '--data'"), (["--data", "nowhere"], "groundtruth.csv is missing")],
 )
 def test_missing_data_is_said(arguments, says, tmp_path, monkeypatch):
     monkeypatch.delenv("AUVEST_DATA", raising=False)
@@ -193,7 +194,7 @@ def committed():
 
 
 def test_committed_page_is_that_of_the_committed_results(committed):
-    assert mrclam6.page(committed) == (PAGE / "README.md").read_text()
+    assert page_of(committed) == (PAGE / "README.md").read_text()
 
 
 def test_committed_results_meet_the_targets(committed):
@@ -208,7 +209,7 @@ def test_committed_results_are_what_the_code_gives(committed):
     assert len(tracks) == committed["tracks"]
     rows = {row["filter"]: row for row in committed["filters"]}
     for name in ("dead_reckoning", "ekf_slat"):
-        found = mrclam6.measure(tracks, [mrclam6.follow(track, name) for track in tracks])
+        found = mrclam6.compare(tracks, [mrclam6.follow(track, name) for track in tracks])
         assert found.slave_m == pytest.approx(rows[name]["slave_rmse_m"], rel=1e-6)
         if name == "ekf_slat":
             assert found.relative_m == pytest.approx(rows[name]["relative_rmse_m"], rel=1e-6)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import functools
 import json
 import math
 import re
@@ -18,10 +19,12 @@ from result_support import slat_result
 from typer.testing import CliRunner, Result
 
 from auvest.cli import app
-from auvest.commands import reproduce_slatf, simulate_slatf
-from auvest.reproduce import slatf, slatf_page
+from auvest.commands import reproduce, simulate_slatf
+from auvest.commands.console import to_json
 from auvest.reproduce.claims import NO, YES
-from auvest.reproduce.slatf_figures import FIGURES
+from auvest.reproduce.slatf import claims as slatf_claims
+from auvest.reproduce.slatf import measure as slatf
+from auvest.reproduce.slatf.figures import FIGURES
 from auvest.scenarios import slat
 from auvest.scenarios.paper_slatf import (
     ASSUMPTIONS,
@@ -117,7 +120,7 @@ def test_the_table_is_the_scenario(output: dict[str, Any]) -> None:
 
 
 def verdict(result: slatf.Reproduction, words: str) -> str:
-    (claim,) = [one for one in slatf_page.claims(result) if words in one.paper]
+    (claim,) = [one for one in slatf_claims.claims(result) if words in one.paper]
     return claim.verdict
 
 
@@ -188,9 +191,7 @@ def test_workers_and_progress(small: slatf.Reproduction) -> None:
     again = slatf.measure(
         runs=3, particles=20, seed=3, workers=1, progress=lambda *both: calls.append(both)
     )
-    assert reproduce_slatf.console.to_json(slatf.summary(again)) == reproduce_slatf.console.to_json(
-        slatf.summary(small)
-    )
+    assert to_json(slatf.summary(again)) == to_json(slatf.summary(small))
     assert calls[-1][0] == calls[-1][1]
     assert [done for done, _ in calls] == sorted(done for done, _ in calls)
 
@@ -231,10 +232,10 @@ def test_one_run_is_enough_for_a_page(tmp_path: Path) -> None:
 def test_interrupt_and_failed_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, small: slatf.Reproduction
 ) -> None:
-    monkeypatch.setattr(slatf, "measure", lambda **_: small)
+    monkeypatch.setattr(slatf, "measure", functools.wraps(slatf.measure)(lambda **_: small))
     arguments = ["reproduce", "slatf", "--json", "--output", str(tmp_path)]
     small.levels[1]["slatf1"].status[0] = 2
-    monkeypatch.setattr(reproduce_slatf, "draw_figures", lambda *_: None)
+    monkeypatch.setattr(reproduce, "save_figures", lambda *_: None)
     failed = call(*arguments)
     assert failed.exit_code == 1
     assert json.loads(failed.stdout)["failed_runs"] == 1
@@ -244,7 +245,7 @@ def test_interrupt_and_failed_runs(
     def interrupted(*_: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(reproduce_slatf, "draw_figures", interrupted)
+    monkeypatch.setattr(reproduce, "save_figures", interrupted)
     result = call(*arguments)
     assert result.exit_code == 130
     assert result.stdout == ""

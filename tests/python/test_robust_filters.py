@@ -324,3 +324,25 @@ def test_a_row_that_fails_leaves_the_filter_at_the_row_before():
     g.run(z[:11], dt=1.0, input=motion[:11], place=leader[:11])
     assert everything(f)[:2] == everything(g)[:2]
     assert len(caught.value.partial) == 11
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize("kind", [auvest.RobustEkf, auvest.RobustUkf])
+def test_rejections_of_what_does_not_see_the_position_do_not_widen_it(kind, dtype):
+    """A velocity log that fails: the slope of the position in it is 0, or rounding."""
+    p0 = np.diag([4.0, 4.0, 0.04, 0.04])
+    p0[0, 2] = p0[2, 0] = p0[1, 3] = p0[3, 1] = 0.2
+    f = kind(
+        [40.0, 30.0, 0.4, 0.3],
+        p0,
+        process=auvest.WhiteAcceleration(),
+        sensors=auvest.BodyVelocity(),
+        recovery=auvest.RejectionStreak(rejections=2),
+        dtype=dtype,
+    )
+    before = f.P
+    for _ in range(4):
+        f.update([30.0, 30.0])
+        assert f.report.decision == Decision.rejected
+    assert f.report.recovered  # that is all that the rule can do: the position is not to blame
+    assert same_bits(f.P, before)

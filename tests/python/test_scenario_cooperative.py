@@ -162,9 +162,9 @@ def test_the_figures_of_a_result_by_hand():
 def test_factors_are_of_variances():
     plain = slave_filter()
     wide = slave_filter(q_factor=4.0, r_factor=9.0)
-    assert plain.measurement.sigma_range_m == 1.0
-    assert wide.measurement.sigma_range_m == 3.0
-    assert slave_filter(r_factor=0.25, sigma_range_m=3.0).measurement.sigma_range_m == 1.5
+    halved = slave_filter(r_factor=0.25, sigma_range_m=3.0)
+    sigmas = [f.sensors["LeaderRange"].sigma_range_m for f in (plain, wide, halved)]
+    assert sigmas == [1.0, 3.0, 1.5]
     for name in ("sigma_forward", "sigma_heading"):
         assert getattr(wide.process, name) == 2 * getattr(plain.process, name) > 0
 

@@ -17,7 +17,7 @@ SENSOR = auvest.RangeBearing(station=(0.0, 0.0), sigma_range_m=0.1, sigma_bearin
 
 
 def ekf(x, p):
-    return auvest.Ekf(x, p, process=PROCESS, measurement=SENSOR)
+    return auvest.Ekf(x, p, process=PROCESS, sensors=SENSOR)
 
 
 def simulate(make=ekf, process=PROCESS, sensor=SENSOR, **options):
@@ -43,7 +43,7 @@ def test_each_number_of_a_fix_has_its_own_noise(name):
     )
 
     def sure(x, p):
-        return auvest.Ekf(x, p, process=still, measurement=SENSOR)
+        return auvest.Ekf(x, p, process=still, sensors=SENSOR)
 
     errors = simulate(sure, still, world, P0=1e-12 * np.eye(6))
     # 800 values; one squared normal deviate has a variance of 2, four of them one of 32.
@@ -67,7 +67,7 @@ def test_the_start_is_a_draw_from_the_belief():
     def make(x, p):
         assert np.array_equal(x, X0)
         assert np.array_equal(p, tilted)
-        return auvest.Ekf(x, p, process=PROCESS, measurement=blind)
+        return auvest.Ekf(x, p, process=PROCESS, sensors=blind)
 
     errors = simulate(make, sensor=blind, P0=tilted, steps=1, runs=2000, interval_s=1e-9)
     start = errors.error[:, 0]
@@ -85,7 +85,7 @@ def test_the_error_is_the_estimate_less_the_truth():
     made = []
 
     def make(x, p):
-        made.append(auvest.Ekf(x, p, process=PROCESS, measurement=blind))
+        made.append(auvest.Ekf(x, p, process=PROCESS, sensors=blind))
         return made[-1]
 
     errors = simulate(make, sensor=exact, steps=1, runs=5)
@@ -100,10 +100,10 @@ def test_an_aukf_is_sampled_when_it_asks():
 
     def aukf(x, p):
         policy = auvest.FixedInterval(interval_s=2.0)
-        return auvest.Aukf(x, p, process=PROCESS, measurement=SENSOR, policy=policy)
+        return auvest.Aukf(x, p, process=PROCESS, sensors=SENSOR, policy=policy)
 
     def ukf(x, p):
-        return auvest.Ukf(x, p, process=PROCESS, measurement=SENSOR)
+        return auvest.Ukf(x, p, process=PROCESS, sensors=SENSOR)
 
     asked = simulate(aukf, steps=5, runs=2, interval_s=0.5)
     assert np.array_equal(asked.error, simulate(ukf, steps=5, runs=2, interval_s=2.0).error)

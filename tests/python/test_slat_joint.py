@@ -11,7 +11,7 @@ import pytest
 
 import auvest
 from auvest import UNKNOWN_MASTER, EkfSlat, Outage, SlatfJoint
-from auvest.reproduce import slatf
+from auvest.reproduce.slatf import measure as slatf
 from auvest.scenarios.paper_slatf import LEVELS, paper_filter, paper_scenario
 from auvest.scenarios.slat import simulate
 

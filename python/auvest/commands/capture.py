@@ -1,4 +1,20 @@
-"""``auvest capture``: record what the sketch ``tracking_loop`` reports, on a board or simulated."""
+"""``auvest capture``: record what the sketch ``tracking_loop`` reports, on a board or simulated.
+
+The sketch runs on an Arduino at --port, or on a simulated one with --simulator, where the vehicle
+and its sonar are simulated too. --play-sonar simulates them for a board that has no sonar.
+Every sample is in the CSV file as soon as it has come, with all the bits of its floats; Ctrl-C
+ends a recording and keeps it.
+
+Examples
+--------
+  auvest capture --simulator tracking_loop.ino.elf
+
+  auvest capture --simulator tracking_loop.ino.elf --noise lognormal --dropout 0.2
+
+  auvest capture --port /dev/ttyACM0 --output dive-7
+
+  auvest capture --port /dev/ttyACM0 --play-sonar --steps 60
+"""
 
 from __future__ import annotations
 
@@ -10,47 +26,26 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-import numpy.typing as npt
 import typer
 from rich.table import Table
 
 from auvest import MahalanobisInterval, RangeBearing, metrics, telemetry
 from auvest.board import Board, BoardError, Finished, PinChange, SerialLine
 from auvest.commands import options
-from auvest.commands.console import Terminal
+from auvest.commands.console import Terminal, table
 from auvest.commands.exit_codes import ExitCode
-from auvest.commands.files import write_results
-from auvest.commands.options import WORLD, refuse_given
-from auvest.commands.version import version
+from auvest.commands.options import WORLD, fraction, option, refuse_given
+from auvest.commands.session import Floats, Session
 from auvest.scenarios import paper_aukf
 from auvest.scenarios.paper_aukf import observed_positions
 from auvest.scenarios.tracking import Noise, Track
 from auvest.telemetry import LineError, Reader, Row
-
-Floats = npt.NDArray[np.float64]
 
 #: The pin that the sketch triggers its sonar with: D8 of an Arduino MEGA2560.
 TRIGGER_PIN = "PORTH5"
 #: Without a sample for this long, s, and for three intervals, the board is taken for lost.
 SILENCE_S = 10.0
 SOUND_M_S = 1500.0
-
-HELP = """\
-The sketch runs on an Arduino at --port, or on a simulated one with --simulator, where the vehicle \
-and its sonar are simulated too. --play-sonar simulates them for a board that has no sonar. \
-Every sample is in the CSV file as soon as it has come, with all the bits of its floats; Ctrl-C \
-ends a recording and keeps it.
-
-Examples:
-
-  auvest capture --simulator tracking_loop.ino.elf
-
-  auvest capture --simulator tracking_loop.ino.elf --noise lognormal --dropout 0.2
-
-  auvest capture --port /dev/ttyACM0 --output dive-7
-
-  auvest capture --port /dev/ttyACM0 --play-sonar --steps 60
-"""
 
 _NOISE = paper_aukf.paper_noise()
 
@@ -240,23 +235,13 @@ def command(
         typer.Option(metavar="X Y", help="Where the station is, m, as in the sketch."),
     ] = RangeBearing().station,
     play_sonar: Annotated[
-        bool,
-        typer.Option(
-            "--play-sonar",
-            help="Answer the board at --port as sonar.",
-            rich_help_panel=WORLD,
-        ),
+        bool, option(WORLD, "Answer the board at --port as sonar.", "--play-sonar")
     ] = False,
     noise: options.Noise = "normal",
     range_noise: options.RangeNoise = _NOISE.range_m,
     bearing_noise: options.BearingNoise = _NOISE.bearing_rad,
     dropout: Annotated[
-        float,
-        typer.Option(
-            callback=options.fraction,
-            help="Probability that an answer never comes.",
-            rich_help_panel=WORLD,
-        ),
+        float, option(WORLD, "Probability that an answer never comes.", check=fraction)
     ] = 0.0,
     seed: options.Seed = 1,
     output: options.Output = Path("auvest-output/capture"),
@@ -264,7 +249,7 @@ def command(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Record; the help text is :data:`HELP`."""
+    """Record; the help text is the module's."""
     terminal = Terminal(as_json=as_json, quiet=quiet)
     if (port is None) == (simulator is None):
         raise typer.BadParameter("give one of the two.", param_hint="'--port' / '--simulator'")
@@ -281,15 +266,20 @@ def command(
         noise, range_m=range_noise, bearing_rad=bearing_noise, dropout=dropout
     )
     sonar = SimulatedSonar(errors, seed=seed, station=sensor.station) if played else None
-    terminal.make_folder(output)
+    settings: dict[str, Any] = {
+        "source": str(simulator or port),
+        "steps": steps,
+        "station": list(sensor.station),
+    }
+    if played:
+        settings.update(noise=asdict(errors), seed=seed)
+    session = Session(terminal, output, "capture", settings)
     path = output / "record.csv"
     if port is not None and path.exists():
         terminal.fail(
             f"{path} exists and will not be overwritten: choose another --output", ExitCode.USAGE
         )
 
-    interrupted = False
-    trouble = ""
     with terminal.writing(output):
         recording = Recording(path, sonar)
         with terminal.progress("samples") as progress:
@@ -306,47 +296,27 @@ def command(
                 elif port is not None:
                     _listen(port, baud, recording, wanted)
             except KeyboardInterrupt:
-                interrupted = steps is not None
+                session.interrupted = steps is not None
             except (BoardError, _ConnectionLost, FileNotFoundError, ValueError) as error:
-                trouble = str(error)  # ValueError: what was given as sketch is none
+                session.trouble = str(error)  # ValueError: what was given as sketch is none
             finally:
                 recording.close()
     if not recording.rows:
         path.unlink(missing_ok=True)
-        why = trouble or recording.last_damage or "interrupted"
-        code = ExitCode.INTERRUPTED if interrupted else ExitCode.FAILED
+        why = session.trouble or recording.last_damage or "interrupted"
+        code = ExitCode.INTERRUPTED if session.interrupted else ExitCode.FAILED
         terminal.fail(f"no sample has come: {why}", code)
 
     values = measures(recording, simulated=simulator is not None)
-    settings: dict[str, Any] = {
-        "source": str(simulator or port),
-        "steps": steps,
-        "station": list(sensor.station),
-    }
-    if played:
-        settings.update(noise=asdict(errors), seed=seed)
+    source = settings["source"]
     files = {"record": path}
-    with terminal.writing(output):
-        if not no_figure:
-            files["figure"] = _draw(output / "figure.png", recording, sensor, settings["source"])
-        document = {
-            "command": "capture",
-            "version": version(),
-            "settings": settings,
-            "complete": not (interrupted or trouble),
-            "results": values,
-        }
-        write_results(output, document, files)
-
-    terminal.result_json(document)
-    terminal.result(_table(values, settings["source"]))
-    terminal.files(files)
-    if trouble:
-        terminal.fail(f"{trouble}; the samples until then are kept", ExitCode.FAILED)
-    if interrupted:
-        terminal.fail(
-            f"interrupted: {values['samples']} of {steps} samples are kept", ExitCode.INTERRUPTED
-        )
+    if not no_figure:
+        with terminal.writing(output):
+            files["figure"] = _draw(output / "figure.png", recording, sensor, source)
+    session.report(values, files, _table(values, source))
+    kept = f"{values['samples']} of {steps} samples are kept"
+    lost = f"{session.trouble}; the samples until then are kept" if session.trouble else ""
+    session.end(kept, lost)
 
 
 def run_simulated(
@@ -471,13 +441,6 @@ def _draw(path: Path, recording: Recording, sensor: RangeBearing, source: str) -
 
 
 def _table(values: dict[str, Any], source: str) -> Table:
-    table = Table(
-        title=f"{source}: {values['samples']} samples in {values['duration_s']:.1f} s",
-        title_justify="left",
-        title_style="bold",
-    )
-    for title, justify in (("quantity", "left"), ("value", "right"), ("note", "left")):
-        table.add_column(title, justify=justify)  # type: ignore[arg-type]
     rows = [
         ("missed measurements", f"{values['missed']}", "predicted only"),
         ("answers refused", f"{values['refused_answers']}", "corrupt, or to another sample"),
@@ -498,6 +461,5 @@ def _table(values: dict[str, Any], source: str) -> Table:
         rows.append(("worst timing error / ms", f"{error:.3f}", "trigger against commanded moment"))
     if math.isfinite(values["rmse_m"]):
         rows.append(("position RMSE / m", f"{values['rmse_m']:.4f}", "against the simulated truth"))
-    for row in rows:
-        table.add_row(*row)
-    return table
+    title = f"{source}: {values['samples']} samples in {values['duration_s']:.1f} s"
+    return table(title, ("quantity", "value", "note"), rows, right={1})

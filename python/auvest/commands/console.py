@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
@@ -17,6 +17,7 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
 
 from auvest.commands.exit_codes import ExitCode
 
@@ -99,6 +100,18 @@ class Terminal:
             yield
         except OSError as error:
             self.fail(f"cannot write to {folder}: {error.strerror or error}", ExitCode.FAILED)
+
+
+def table(
+    title: str, header: Sequence[str], rows: Iterable[Sequence[str]], right: Container[int] = ()
+) -> Table:
+    """Make a table; ``right`` are the columns that are flush right."""
+    made = Table(title=title, title_justify="left", title_style="bold")
+    for number, name in enumerate(header):
+        made.add_column(name, justify="right" if number in right else "left")
+    for row in rows:
+        made.add_row(*row)
+    return made
 
 
 def to_json(value: Any) -> str:

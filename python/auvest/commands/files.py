@@ -28,7 +28,7 @@ def write_results(folder: Path, document: dict[str, Any], files: dict[str, Path]
     """Write results.json; ``files`` gets its path, and ``document`` the paths of all files."""
     files["results"] = folder / "results.json"
     document["files"] = {name: str(path) for name, path in files.items()}
-    files["results"].write_text(console.to_json(document) + "\n", encoding="utf-8")
+    _write(files["results"], console.to_json(document) + "\n")
 
 
 def write_page(
@@ -39,14 +39,15 @@ def write_page(
     done: list[Path],
 ) -> None:
     """Write results.json, the CSV files and the page; ``done`` gets each path when it is there."""
-    path = folder / "results.json"
-    path.write_text(console.to_json(document) + "\n", encoding="utf-8")
-    done.append(path)
+    done.append(_write(folder / "results.json", console.to_json(document) + "\n"))
     for stem, table in tables.items():
         done.append(write_csv(folder / f"{stem}.csv", table))
-    path = folder / "README.md"
-    path.write_text(page, encoding="utf-8")
-    done.append(path)
+    done.append(_write(folder / "README.md", page))
+
+
+def _write(path: Path, text: str) -> Path:
+    path.write_text(text, encoding="utf-8")
+    return path
 
 
 def save_figures(

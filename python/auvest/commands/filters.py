@@ -1,4 +1,14 @@
-"""``auvest filters``: which filters there are, with which models, and where each runs."""
+"""``auvest filters``: which filters there are, with which models, and where each runs.
+
+A filter runs under Python in any case. "chip" says that it is built for the vehicle, "parity" that
+tests show the same float32 bits on every target, "budget" that docs/budgets.md has what it costs.
+
+Examples
+--------
+  auvest filters
+
+  auvest filters --json
+"""
 
 from __future__ import annotations
 
@@ -8,20 +18,9 @@ from auvest.commands import options
 from auvest.commands.console import Terminal, to_json
 from auvest.registry import FILTERS
 
-HELP = """\
-A filter runs under Python in any case. "chip" says that it is built for the vehicle, "parity" that
-tests show the same float32 bits on every target, "budget" that docs/budgets.md has what it costs.
-
-Examples:
-
-  auvest filters
-
-  auvest filters --json
-"""
-
 
 def command(as_json: options.Json = False, quiet: options.Quiet = False) -> None:
-    """List the filters; the help text is :data:`HELP`."""
+    """List the filters."""
     terminal = Terminal(as_json=as_json, quiet=quiet)
     rows = [entry.row() for entry in FILTERS.values()]
     if as_json:

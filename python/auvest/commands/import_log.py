@@ -1,4 +1,15 @@
-"""``auvest import``: published recordings as logs that ``auvest replay`` reads."""
+"""``auvest import``: published recordings as logs that ``auvest replay`` reads.
+
+Knows goats14, hat_charles, labyrinth_uwb, mrclam6 and ugps_pier59 as the project's validation data
+have them, and mrclam: the original text files of any UTIAS MR.CLAM set. What is taken from each is
+said in docs/logs.md.
+
+Examples
+--------
+  auvest import goats14 data/goats14 logs
+
+  auvest import mrclam MRCLAM_Dataset6 logs/mrclam6
+"""
 
 from __future__ import annotations
 
@@ -11,18 +22,6 @@ from auvest.commands import options
 from auvest.commands.console import Terminal
 from auvest.commands.version import version
 from auvest.logs.importers import IMPORTERS
-
-HELP = """\
-Knows goats14, hat_charles, labyrinth_uwb, mrclam6 and ugps_pier59 as the project's validation data
-have them, and mrclam: the original text files of any UTIAS MR.CLAM set. What is taken from each is
-said in docs/logs.md.
-
-Examples:
-
-  auvest import goats14 data/goats14 logs
-
-  auvest import mrclam MRCLAM_Dataset6 logs/mrclam6
-"""
 
 SetName = Literal["goats14", "hat_charles", "labyrinth_uwb", "mrclam6", "mrclam", "ugps_pier59"]
 
@@ -39,7 +38,7 @@ def command(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Import; the help text is :data:`HELP`."""
+    """Import; the help text is the module's."""
     terminal = Terminal(as_json=as_json, quiet=quiet)
     terminal.make_folder(output)
     with terminal.usage_errors(), terminal.writing(output):

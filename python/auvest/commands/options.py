@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -60,6 +61,17 @@ def open_unit(value: float | None) -> float | None:
     return value
 
 
+def option(
+    panel: str,
+    text: str,
+    *names: str,
+    check: Callable[[Any], Any] | None = None,
+    **more: Any,
+) -> Any:
+    """Describe an option: its panel of --help, its help, its names if not the parameter's."""
+    return typer.Option(*names, callback=check, help=text, rich_help_panel=panel, **more)
+
+
 Runs = Annotated[
     int, typer.Option("--runs", min=1, max=100_000, help="Monte Carlo runs.", show_default=True)
 ]
@@ -80,61 +92,34 @@ Workers = Annotated[
     int | None,
     typer.Option("--workers", min=1, max=256, help="Threads.", show_default="one per processor"),
 ]
-Json = Annotated[
-    bool,
-    typer.Option(
-        "--json", help="One JSON object on stdout, nothing else.", rich_help_panel=_OUTPUT
-    ),
-]
-Quiet = Annotated[
-    bool,
-    typer.Option("--quiet", "-q", help="Only errors on stderr.", rich_help_panel=_OUTPUT),
-]
+Json = Annotated[bool, option(_OUTPUT, "One JSON object on stdout, nothing else.", "--json")]
+Quiet = Annotated[bool, option(_OUTPUT, "Only errors on stderr.", "--quiet", "-q")]
 Output = Annotated[
+    Path, option(_OUTPUT, "Folder for the results; made if missing.", "--output", file_okay=False)
+]
+#: Recordings are not part of the package.
+Data = Annotated[
     Path,
     typer.Option(
-        "--output",
+        "--data",
+        envvar="AUVEST_DATA",
         file_okay=False,
-        help="Folder for the results; made if missing.",
-        rich_help_panel=_OUTPUT,
+        help="Folder of the recordings.",
+        show_default=False,
     ),
 ]
-NoFigure = Annotated[
-    bool, typer.Option("--no-figure", help="Draw nothing.", rich_help_panel=_OUTPUT)
-]
+NoFigure = Annotated[bool, option(_OUTPUT, "Draw nothing.", "--no-figure")]
 Precision = Annotated[
-    DTypeName,
-    typer.Option(
-        "--dtype",
-        help="Precision; float32 gives the bits of the vehicle.",
-        rich_help_panel=FILTER,
-    ),
+    DTypeName, option(FILTER, "Precision; float32 gives the bits of the vehicle.", "--dtype")
 ]
 
 # The noise of the AUKF paper's scenario: `simulate aukf` and `capture`.
 Noise = Annotated[
-    NoiseKind,
-    typer.Option(
-        "--noise",
-        help="Kind of both noises: U(0,1), N(0,1) or exp(N(0,1)).",
-        rich_help_panel=WORLD,
-    ),
+    NoiseKind, option(WORLD, "Kind of both noises: U(0,1), N(0,1) or exp(N(0,1)).", "--noise")
 ]
 RangeNoise = Annotated[
-    float,
-    typer.Option(
-        "--range-noise",
-        callback=positive,
-        help="Scale of the range noise, m.",
-        rich_help_panel=WORLD,
-    ),
+    float, option(WORLD, "Scale of the range noise, m.", "--range-noise", check=positive)
 ]
 BearingNoise = Annotated[
-    float,
-    typer.Option(
-        "--bearing-noise",
-        callback=positive,
-        help="Scale of the bearing noise, rad.",
-        rich_help_panel=WORLD,
-    ),
+    float, option(WORLD, "Scale of the bearing noise, rad.", "--bearing-noise", check=positive)
 ]

@@ -1,4 +1,17 @@
-"""``auvest replay``: recorded runs through a filter, with tables, a figure and a report of each."""
+"""``auvest replay``: recorded runs through a filter, with tables, a figure and a report of each.
+
+A LOG is a folder of CSV files, as docs/logs.md describes it and 'auvest import' makes it. For each
+the output folder gets a folder with the estimates, measurements and errors as CSV and Parquet, the
+track as TUM text, a figure, one self-contained HTML report and results.json.
+
+Examples
+--------
+  auvest import goats14 data/goats14 logs
+
+  auvest replay logs/goats14 --config goats14
+
+  auvest replay logs/robot* --filter ekf --json --quiet | jq '.logs[].rmse_m'
+"""
 
 from __future__ import annotations
 
@@ -6,10 +19,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.table import Table
 
 from auvest.commands import console, options
-from auvest.commands.console import Terminal
+from auvest.commands.console import Terminal, table
 from auvest.commands.exit_codes import ExitCode
 from auvest.commands.version import version
 from auvest.errors import FilterError
@@ -17,20 +29,6 @@ from auvest.logs import LogFolder
 from auvest.replay import Result, Settings, find_settings
 from auvest.replay import replay as run_replay
 from auvest.replay.config import FilterName, packaged_settings
-
-HELP = """\
-A LOG is a folder of CSV files, as docs/logs.md describes it and 'auvest import' makes it. For each
-the output folder gets a folder with the estimates, measurements and errors as CSV and Parquet, the
-track as TUM text, a figure, one self-contained HTML report and results.json.
-
-Examples:
-
-  auvest import goats14 data/goats14 logs
-
-  auvest replay logs/goats14 --config goats14
-
-  auvest replay logs/robot* --filter ekf --json --quiet | jq '.logs[].rmse_m'
-"""
 
 
 def command(
@@ -57,7 +55,7 @@ def command(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Replay; the help text is :data:`HELP`."""
+    """Replay; the help text is the module's."""
     terminal = Terminal(as_json=as_json, quiet=quiet)
     with terminal.usage_errors():
         settings = Settings() if config is None else find_settings(config)
@@ -118,14 +116,8 @@ def write_results(folder: Path, result: Result) -> None:
 def _show(terminal: Terminal, result: Result, folder: Path) -> None:
     from auvest.replay import report
 
-    table = Table(
-        title=f"{result.name}, {result.filter_name}", title_justify="left", title_style="bold"
-    )
-    table.add_column("quantity")
-    table.add_column("value", justify="right")
-    for row in report.rows(result):
-        table.add_row(*row)
-    terminal.result(table)
+    title = f"{result.name}, {result.filter_name}"
+    terminal.result(table(title, ("quantity", "value"), report.rows(result), right={1}))
     terminal.result(f"report    {folder / 'report.html'}")
     terminal.result(f"tables    {folder}: estimates, measurements, errors as .csv and .parquet")
     terminal.result(f"track     {folder / 'trajectory.tum'}\n")

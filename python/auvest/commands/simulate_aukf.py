@@ -1,47 +1,10 @@
-"""``auvest simulate aukf``: the paper's scenario with any filter, interval policy and noise."""
+"""``auvest simulate aukf``: the paper's scenario with any filter, interval policy and noise.
 
-from __future__ import annotations
-
-from dataclasses import asdict
-from pathlib import Path
-from typing import Annotated, Any, Literal
-
-import numpy as np
-import numpy.typing as npt
-import typer
-from rich.table import Table
-
-from auvest import (
-    CovarianceBudget,
-    FixedInterval,
-    MahalanobisInterval,
-    RangeBearing,
-    Status,
-    metrics,
-)
-from auvest.commands import options
-from auvest.commands.console import Terminal
-from auvest.commands.exit_codes import ExitCode
-from auvest.commands.files import write_csv, write_results
-from auvest.commands.options import FILTER, MONTE_CARLO, WORLD, refuse_given
-from auvest.commands.version import version
-from auvest.intervals import IntervalPolicy
-from auvest.scenarios import paper_aukf
-from auvest.scenarios.paper_aukf import (
-    FilterName,
-    TrackName,
-    observed_positions,
-)
-from auvest.scenarios.tracking import Scenario, TrackingResult, simulate
-
-Floats = npt.NDArray[np.float64]
-
-HELP = """\
 A station at (0.2, 2) m tracks a vehicle by range and bearing (Deng, Yin, Duan 2019, section 3).
 The AUKF chooses its own sampling interval; ekf and ukf sample at a fixed one.
 
-Examples:
-
+Examples
+--------
   auvest simulate aukf
 
   auvest simulate aukf --filter ukf --fixed-interval 0.6 --noise lognormal
@@ -51,6 +14,48 @@ Examples:
   auvest simulate aukf --preset table1 --json > table1.json
 """
 
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import typer
+from rich.table import Table
+
+from auvest import (
+    CovarianceBudget,
+    FixedInterval,
+    MahalanobisInterval,
+    RangeBearing,
+    metrics,
+)
+from auvest.commands import options
+from auvest.commands.console import Terminal, table
+from auvest.commands.files import write_csv
+from auvest.commands.options import (
+    FILTER,
+    MONTE_CARLO,
+    WORLD,
+    finite,
+    fraction,
+    open_unit,
+    option,
+    positive,
+    refuse_given,
+)
+from auvest.commands.session import Floats, Session, failure
+from auvest.intervals import IntervalPolicy
+from auvest.scenarios import paper_aukf
+from auvest.scenarios.paper_aukf import (
+    FilterName,
+    TrackName,
+    observed_positions,
+)
+from auvest.scenarios.tracking import Scenario, TrackingResult, sensor_of, simulate
+
 _INTERVAL = "Sampling interval"
 
 _NOISE = paper_aukf.paper_noise()
@@ -59,83 +64,62 @@ _LAW = MahalanobisInterval()
 
 def command(
     ctx: typer.Context,
-    filter_name: Annotated[
-        FilterName, typer.Option("--filter", help="The filter.", rich_help_panel=FILTER)
-    ] = "aukf",
+    filter_name: Annotated[FilterName, option(FILTER, "The filter.", "--filter")] = "aukf",
     alpha: Annotated[
-        float,
-        typer.Option(
-            callback=options.positive,
-            help="Spread of the sigma points.",
-            rich_help_panel=FILTER,
-        ),
+        float, option(FILTER, "Spread of the sigma points.", check=positive)
     ] = paper_aukf.ALPHA,
     beta: Annotated[
-        float,
-        typer.Option(
-            callback=options.finite,
-            help="Weight of prior knowledge.",
-            rich_help_panel=FILTER,
-        ),
+        float, option(FILTER, "Weight of prior knowledge.", check=finite)
     ] = paper_aukf.BETA,
     kappa: Annotated[
-        float,
-        typer.Option(
-            callback=options.finite,
-            help="Second scale of the sigma points, above -6.",
-            rich_help_panel=FILTER,
-        ),
+        float, option(FILTER, "Second scale of the sigma points, above -6.", check=finite)
     ] = paper_aukf.KAPPA,
     dtype: options.Precision = "float64",
     interval: Annotated[
         Literal["fixed", "mahalanobis", "covariance-budget"] | None,
-        typer.Option(
-            help="Interval policy.",
+        option(
+            _INTERVAL,
+            "Interval policy.",
             show_default="mahalanobis for aukf, fixed for ekf and ukf",
-            rich_help_panel=_INTERVAL,
         ),
     ] = None,
     preset: Annotated[
         Literal["figure3", "table1"] | None,
-        typer.Option(
-            help="Values of the paper's law (mahalanobis).",
-            show_default=_LAW.preset,
-            rich_help_panel=_INTERVAL,
-        ),
+        option(_INTERVAL, "Values of the paper's law (mahalanobis).", show_default=_LAW.preset),
     ] = None,
     tau0: Annotated[
         float | None,
-        typer.Option(
-            callback=options.open_unit,
-            help="First tau of the law, in (0, 1) (mahalanobis).",
+        option(
+            _INTERVAL,
+            "First tau of the law, in (0, 1) (mahalanobis).",
+            check=open_unit,
             show_default=f"{_LAW.tau0:g}",
-            rich_help_panel=_INTERVAL,
         ),
     ] = None,
     fixed_interval: Annotated[
         float | None,
-        typer.Option(
-            callback=options.positive,
-            help="The fixed interval, s (fixed).",
+        option(
+            _INTERVAL,
+            "The fixed interval, s (fixed).",
+            check=positive,
             show_default=f"{paper_aukf.FIXED_INTERVAL_S:g}",
-            rich_help_panel=_INTERVAL,
         ),
     ] = None,
     budget: Annotated[
         float | None,
-        typer.Option(
-            callback=options.positive,
-            help="Position standard deviation allowed before an update, m (covariance-budget).",
+        option(
+            _INTERVAL,
+            "Position standard deviation allowed before an update, m (covariance-budget).",
+            check=positive,
             show_default=f"{CovarianceBudget().position_sigma_m:g}",
-            rich_help_panel=_INTERVAL,
         ),
     ] = None,
     track: Annotated[
         TrackName,
-        typer.Option(
-            help="paper: Eq. (4) as it is printed; straight: the same, exact in time; "
+        option(
+            WORLD,
+            "paper: Eq. (4) as it is printed; straight: the same, exact in time; "
             f"turn: {paper_aukf.TURN_RATE_RAD_S:g} rad/s.",
-            rich_help_panel=WORLD,
         ),
     ] = "paper",
     noise: options.Noise = "normal",
@@ -143,22 +127,16 @@ def command(
     bearing_noise: options.BearingNoise = _NOISE.bearing_rad,
     noise_bias: Annotated[
         Literal["keep", "remove"],
-        typer.Option(
-            help="Uniform and lognormal noise have a mean: keep it, as in the paper, or remove it.",
-            rich_help_panel=WORLD,
+        option(
+            WORLD,
+            "Uniform and lognormal noise have a mean: keep it, as in the paper, or remove it.",
         ),
     ] = "keep",
     dropout: Annotated[
-        float,
-        typer.Option(
-            callback=options.fraction,
-            help="Probability that a measurement is missing.",
-            rich_help_panel=WORLD,
-        ),
+        float, option(WORLD, "Probability that a measurement is missing.", check=fraction)
     ] = 0.0,
     steps: Annotated[
-        int,
-        typer.Option(min=2, max=100_000, help="Samples of each run.", rich_help_panel=MONTE_CARLO),
+        int, option(MONTE_CARLO, "Samples of each run.", min=2, max=100_000)
     ] = paper_aukf.STEPS,
     runs: options.Runs = 200,
     seed: options.Seed = 1,
@@ -168,7 +146,7 @@ def command(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Simulate; the help text is :data:`HELP`."""
+    """Simulate; the help text is the module's."""
     terminal = Terminal(as_json=as_json, quiet=quiet)
     if filter_name == "ekf":
         refuse_given(
@@ -214,56 +192,24 @@ def command(
         "runs": runs,
         "seed": seed,
     }
-    terminal.make_folder(output)
-
-    interrupted = False
-    with terminal.progress("runs") as progress:
-        try:
-            result = simulate(filter_, scenario, workers=workers, progress=progress)
-        except KeyboardInterrupt as stop:
-            interrupted = True
-            partial: TrackingResult | None = getattr(stop, "partial", None)
-            if partial is None:
-                terminal.fail("interrupted: no run was done", ExitCode.INTERRUPTED)
-            result = partial
-
+    session = Session(terminal, output, "simulate aukf", settings)
+    result = session.run(simulate, filter_, scenario, workers=workers)
+    if result is None:
+        session.nothing_done()
     values = measures(result)
     per_step = means_per_step(result)
     with terminal.writing(output):
         files = {
             "per_step": write_csv(output / "per_step.csv", per_step),
-            "one_run": write_csv(
-                output / "one_run.csv", one_run(result, filter_.sensors["RangeBearing"])
-            ),
+            "one_run": write_csv(output / "one_run.csv", one_run(result, sensor_of(filter_))),
         }
         if not no_figure:
             files["figure"] = _draw(
-                output / "figure.png", result, filter_.sensors["RangeBearing"], filter_name, policy
+                output / "figure.png", result, sensor_of(filter_), filter_name, policy
             )
-        document = {
-            "command": "simulate aukf",
-            "version": version(),
-            "settings": settings,
-            "complete": not interrupted,
-            "results": values,
-            "per_step": per_step,
-        }
-        write_results(output, document, files)
-
-    terminal.result_json(document)
-    terminal.result(_table(values, settings))
-    terminal.files(files)
-    if interrupted:
-        terminal.fail(
-            f"interrupted: {values['runs']} of {runs} runs are done and kept", ExitCode.INTERRUPTED
-        )
-    if values["failed_runs"]:
-        first = int(np.flatnonzero(result.failed)[0])
-        terminal.fail(
-            f"{values['failed_runs']} of {values['runs']} runs failed; the first, run {first}, "
-            f"after {int(result.samples[first])} steps: {Status(int(result.status[first])).name}",
-            ExitCode.FAILED,
-        )
+    session.report(values, files, _table(values, settings), per_step=per_step)
+    kept = f"{values['runs']} of {runs} runs are done and kept"
+    session.end(kept, failure(result))
 
 
 def _interval_policy(
@@ -282,25 +228,23 @@ def _interval_policy(
             f"'{kind}' needs --filter aukf; {filter_name} samples at a fixed interval.",
             param_hint="'--interval'",
         )
-    owners = {
-        "--preset": ("mahalanobis", preset),
-        "--tau0": ("mahalanobis", tau0),
-        "--fixed-interval": ("fixed", fixed),
-        "--budget": ("covariance-budget", budget),
+    policies: dict[str, tuple[Callable[..., IntervalPolicy], dict[str, tuple[str, object]]]] = {
+        "fixed": (FixedInterval, {"--fixed-interval": ("interval_s", fixed)}),
+        "covariance-budget": (CovarianceBudget, {"--budget": ("position_sigma_m", budget)}),
+        "mahalanobis": (
+            MahalanobisInterval,
+            {"--preset": ("preset", preset), "--tau0": ("tau0", tau0)},
+        ),
     }
-    for option, (owner, value) in owners.items():
-        if value is not None and owner != kind:
-            raise typer.BadParameter(
-                f"belongs to --interval {owner}, not to {kind}.", param_hint=f"'{option}'"
-            )
+    for owner, (_, owned) in policies.items():
+        for name, (_, value) in owned.items():
+            if value is not None and owner != kind:
+                raise typer.BadParameter(
+                    f"belongs to --interval {owner}, not to {kind}.", param_hint=f"'{name}'"
+                )
+    make, given = policies[kind]
     try:
-        if kind == "fixed":
-            return FixedInterval() if fixed is None else FixedInterval(interval_s=fixed)
-        if kind == "covariance-budget":
-            return (
-                CovarianceBudget() if budget is None else CovarianceBudget(position_sigma_m=budget)
-            )
-        return MahalanobisInterval(preset or _LAW.preset, tau0=tau0)
+        return make(**{name: value for name, value in given.values() if value is not None})
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint=f"'--interval {kind}'") from None
 
@@ -427,16 +371,6 @@ def _draw(
 def _table(values: dict[str, Any], settings: dict[str, Any]) -> Table:
     noise = settings["noise"]
     bias = ", bias removed" if noise["centred"] else ""
-    table = Table(
-        title=f"{settings['filter'].upper()}, {settings['interval']['policy']}: "
-        f"{values['runs']} runs of {settings['steps']} steps, {noise['kind']} noise "
-        f"({noise['range_m']:g} m, {noise['bearing_rad']:g} rad{bias}), "
-        f"track {settings['track']}, seed {settings['seed']}, {settings['dtype']}",
-        title_justify="left",
-        title_style="bold",
-    )
-    for title, justify in (("quantity", "left"), ("value", "right"), ("note", "left")):
-        table.add_column(title, justify=justify)  # type: ignore[arg-type]
     low, high = values["nis_bounds_95"]
     nees_low, nees_high = values["nees_bounds_95_per_step"]
     rows = (
@@ -453,6 +387,10 @@ def _table(values: dict[str, Any], settings: dict[str, Any]) -> Table:
          f"{nees_low:.2f} to {nees_high:.2f}"),
         ("failed runs", f"{values['failed_runs']}", ""),
     )  # fmt: skip
-    for row in rows:
-        table.add_row(*row)
-    return table
+    title = (
+        f"{settings['filter'].upper()}, {settings['interval']['policy']}: "
+        f"{values['runs']} runs of {settings['steps']} steps, {noise['kind']} noise "
+        f"({noise['range_m']:g} m, {noise['bearing_rad']:g} rad{bias}), "
+        f"track {settings['track']}, seed {settings['seed']}, {settings['dtype']}"
+    )
+    return table(title, ("quantity", "value", "note"), rows, right={1})

@@ -1,36 +1,10 @@
-"""``auvest simulate mekf``: range-only localisation with any kernel, timing and noise."""
+"""``auvest simulate mekf``: range-only localisation with any kernel, timing and noise.
 
-from __future__ import annotations
-
-from collections.abc import Callable
-from dataclasses import asdict
-from pathlib import Path
-from typing import Annotated, Any, Literal
-
-import numpy as np
-import numpy.typing as npt
-import typer
-from rich.table import Table
-
-from auvest import RejectionStreak, Status, metrics
-from auvest.commands import options
-from auvest.commands.console import Terminal
-from auvest.commands.exit_codes import ExitCode
-from auvest.commands.files import write_csv, write_results
-from auvest.commands.options import FILTER, MONTE_CARLO, WORLD
-from auvest.commands.version import version
-from auvest.kernels import KernelName
-from auvest.scenarios import cooperative
-from auvest.scenarios.cooperative import NoiseKind, RangeNoise, Result, Scenario, Timing
-
-Floats = npt.NDArray[np.float64]
-
-HELP = """\
 A slave dead-reckons and ranges to two leaders in turn, every 5 s; some ranges are outliers (Li, Du,
 Fan, Chen, Mao, Luo 2020). Every filter sees the same ranges as the EKF beside it.
 
-Examples:
-
+Examples
+--------
   auvest simulate mekf
 
   auvest simulate mekf --kernel huber --outliers 0.2 --timing own-time
@@ -40,104 +14,85 @@ Examples:
   auvest simulate mekf --displaced 200 --steps 600 --json
 """
 
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from rich.table import Table
+
+from auvest import RejectionStreak, metrics
+from auvest.commands import options
+from auvest.commands.console import Terminal, table
+from auvest.commands.files import write_csv
+from auvest.commands.options import FILTER, MONTE_CARLO, WORLD, finite, fraction, option, positive
+from auvest.commands.session import Floats, Session, failure, mean_over_runs
+from auvest.kernels import KernelName, as_kernel
+from auvest.scenarios import cooperative
+from auvest.scenarios.cooperative import NoiseKind, RangeNoise, Result, Scenario, Timing
 
 _NOISE = RangeNoise()
 
 
 def command(
-    kernel: Annotated[
-        KernelName,
-        typer.Option(help="Robust kernel; unit: the plain filter.", rich_help_panel=FILTER),
-    ] = "igg",
+    kernel: Annotated[KernelName, option(FILTER, "Robust kernel; unit: the plain filter.")] = "igg",
     kind: Annotated[
-        Literal["ekf", "ukf"],
-        typer.Option("--filter", help="What the kernel is put into.", rich_help_panel=FILTER),
+        Literal["ekf", "ukf"], option(FILTER, "What the kernel is put into.", "--filter")
     ] = "ekf",
     residual: Annotated[
-        Literal["innovation", "post-fit"],
-        typer.Option(help="What the kernel judges.", rich_help_panel=FILTER),
+        Literal["innovation", "post-fit"], option(FILTER, "What the kernel judges.")
     ] = "innovation",
     rejections: Annotated[
         int,
-        typer.Option(
+        option(
+            FILTER,
+            "Rejections, none like another, after which the covariance is widened; 0: never.",
             min=0,
             max=60,
-            help="Rejections, none like another, after which the covariance is widened; 0: never.",
-            rich_help_panel=FILTER,
         ),
     ] = RejectionStreak().rejections,
     dtype: options.Precision = "float64",
     noise: Annotated[
         NoiseKind,
-        typer.Option(
-            help="contaminated: outliers of another size; multipath: outliers too long; "
+        option(
+            WORLD,
+            "contaminated: outliers of another size; multipath: outliers too long; "
             "student: Student's t.",
-            rich_help_panel=WORLD,
         ),
     ] = "contaminated",
     range_noise: Annotated[
-        float,
-        typer.Option(
-            callback=options.positive,
-            help="Scale of the range noise, m.",
-            rich_help_panel=WORLD,
-        ),
+        float, option(WORLD, "Scale of the range noise, m.", check=positive)
     ] = _NOISE.sigma_m,
-    outliers: Annotated[
-        float,
-        typer.Option(
-            callback=options.fraction, help="Share of the outliers.", rich_help_panel=WORLD
-        ),
-    ] = 0.05,
+    outliers: Annotated[float, option(WORLD, "Share of the outliers.", check=fraction)] = 0.05,
     outlier_sigma: Annotated[
-        float,
-        typer.Option(
-            callback=options.positive,
-            help="Size of the outliers, m.",
-            rich_help_panel=WORLD,
-        ),
+        float, option(WORLD, "Size of the outliers, m.", check=positive)
     ] = _NOISE.outlier_sigma_m,
     degrees_of_freedom: Annotated[
-        int, typer.Option(min=1, max=100, help="Of Student's t.", rich_help_panel=WORLD)
+        int, option(WORLD, "Of Student's t.", min=1, max=100)
     ] = _NOISE.degrees_of_freedom,
     timing: Annotated[
         Timing,
-        typer.Option(
-            help="at-once: a range is there when it is measured; own-time: it comes with the next "
+        option(
+            WORLD,
+            "at-once: a range is there when it is measured; own-time: it comes with the next "
             "message and is taken at its own time; as-if-fresh: the same, the delay ignored.",
-            rich_help_panel=WORLD,
         ),
     ] = "own-time",
-    dropout: Annotated[
-        float,
-        typer.Option(
-            callback=options.fraction, help="Share of messages lost.", rich_help_panel=WORLD
-        ),
-    ] = 0.0,
+    dropout: Annotated[float, option(WORLD, "Share of messages lost.", check=fraction)] = 0.0,
     late: Annotated[
-        float,
-        typer.Option(
-            callback=options.fraction,
-            help="Share of messages that are up to 10 s late.",
-            rich_help_panel=WORLD,
-        ),
+        float, option(WORLD, "Share of messages that are up to 10 s late.", check=fraction)
     ] = 0.0,
     displaced: Annotated[
         float,
-        typer.Option(
-            callback=options.finite,
-            help="Error of the start along x that the filter does not know of, m.",
-            rich_help_panel=WORLD,
+        option(
+            WORLD, "Error of the start along x that the filter does not know of, m.", check=finite
         ),
     ] = 0.0,
     steps: Annotated[
-        int,
-        typer.Option(
-            min=2,
-            max=100_000,
-            help="Seconds of each run; 8280: 2.3 h.",
-            rich_help_panel=MONTE_CARLO,
-        ),
+        int, option(MONTE_CARLO, "Seconds of each run; 8280: 2.3 h.", min=2, max=100_000)
     ] = cooperative.PAPER_STEPS,
     runs: options.Runs = 50,
     seed: options.Seed = 1,
@@ -147,7 +102,7 @@ def command(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Simulate; the help text is :data:`HELP`."""
+    """Simulate; the help text is the module's."""
     terminal = Terminal(as_json=as_json, quiet=quiet)
     with terminal.usage_errors():
         scenario = Scenario(
@@ -180,62 +135,39 @@ def command(
         )
     settings = {
         "filter": kind,
-        "kernel": {"name": kernel, **asdict(robust.kernel)},
+        "kernel": {"name": kernel, **asdict(as_kernel(kernel))},
         "residual": residual,
         "rejections": rejections,
         "dtype": dtype,
         "scenario": asdict(scenario),
     }
-    terminal.make_folder(output)
-
+    session = Session(terminal, output, "simulate mekf", settings)
     results: dict[str, Result] = {}
-    interrupted = False
     for name, filter_ in (("plain", plain), ("robust", robust)):
-        with terminal.progress(f"runs, {name}") as progress:
-            try:
-                results[name] = cooperative.simulate(
-                    filter_, scenario, workers=workers, progress=progress
-                )
-            except KeyboardInterrupt as stop:
-                interrupted = True
-                partial: Result | None = getattr(stop, "partial", None)
-                if partial is not None:
-                    results[name] = partial
-                break
+        result = session.run(
+            cooperative.simulate,
+            filter_,
+            scenario,
+            workers=workers,
+            what=f"runs, {name}",
+        )
+        if result is not None:
+            results[name] = result
+        if session.interrupted:
+            break
     if not results:
-        terminal.fail("interrupted: no run was done", ExitCode.INTERRUPTED)
+        session.nothing_done()
 
     values: dict[str, Any] = {name: measures(result) for name, result in results.items()}
     if len(values) == 2:
         values["improvement"] = 1 - values["robust"]["rmse_m"] / values["plain"]["rmse_m"]
-    per_step = means_per_step(results)
     with terminal.writing(output):
-        files = {"per_step": write_csv(output / "per_step.csv", per_step)}
+        files = {"per_step": write_csv(output / "per_step.csv", means_per_step(results))}
         if not no_figure:
             files["figure"] = _draw(output / "figure.png", results, kernel, kind)
-        document = {
-            "command": "simulate mekf",
-            "version": version(),
-            "settings": settings,
-            "complete": not interrupted,
-            "results": values,
-        }
-        write_results(output, document, files)
-
-    terminal.result_json(document)
-    terminal.result(_table(values, settings))
-    terminal.files(files)
-    if interrupted:
-        terminal.fail("interrupted: what was done is kept", ExitCode.INTERRUPTED)
-    for name, result in results.items():
-        if result.failed.any():
-            first = int(np.flatnonzero(result.failed)[0])
-            terminal.fail(
-                f"{int(result.failed.sum())} of {runs} runs of the {name} filter failed; the "
-                f"first, run {first}, after {int(result.samples[first])} steps: "
-                f"{Status(int(result.status[first])).name}",
-                ExitCode.FAILED,
-            )
+    session.report(values, files, _table(values, settings))
+    failures = (failure(result, f" of the {name} filter") for name, result in results.items())
+    session.end("what was done is kept", *failures)
 
 
 def measures(result: Result) -> dict[str, Any]:
@@ -269,19 +201,10 @@ def means_per_step(results: dict[str, Result]) -> dict[str, Floats]:
     for name, result in results.items():
         square = np.square(result.error).sum(axis=-1)
         variance = np.trace(result.covariance, axis1=-2, axis2=-1)
-        table[f"{name}_rms_error_m"] = np.sqrt(_mean(square))
-        table[f"{name}_sigma_m"] = np.sqrt(_mean(variance))
-        table[f"{name}_nees"] = _mean(result.nees)
+        table[f"{name}_rms_error_m"] = np.sqrt(mean_over_runs(square))
+        table[f"{name}_sigma_m"] = np.sqrt(mean_over_runs(variance))
+        table[f"{name}_nees"] = mean_over_runs(result.nees)
     return table
-
-
-def _mean(values: Floats) -> Floats:
-    """Mean over the runs that got there, NaN where none did."""
-    known = np.isfinite(values)
-    count = known.sum(axis=0)
-    total = np.where(known, values, 0.0).sum(axis=0)
-    mean: Floats = np.divide(total, count, out=np.full(len(count), np.nan), where=count > 0)
-    return mean
 
 
 def _draw(path: Path, results: dict[str, Result], kernel: str, kind: str) -> Path:
@@ -313,18 +236,8 @@ def _draw(path: Path, results: dict[str, Result], kernel: str, kind: str) -> Pat
 def _table(values: dict[str, Any], settings: dict[str, Any]) -> Table:
     scenario = settings["scenario"]
     noise = scenario["noise"]
-    table = Table(
-        title=f"{settings['filter'].upper()} and {settings['kernel']['name']}: {scenario['runs']} "
-        f"runs of {scenario['steps']} s, {noise['kind']} noise, timing {scenario['timing']}, "
-        f"seed {scenario['seed']}, {settings['dtype']}",
-        title_justify="left",
-        title_style="bold",
-    )
     shown = {name: values[name] for name in ("plain", "robust") if name in values}
-    table.add_column("quantity")
-    for name in shown:
-        table.add_column(name, justify="right")
-    rows: dict[str, Callable[[dict[str, Any]], str]] = {
+    cells: dict[str, Callable[[dict[str, Any]], str]] = {
         "position RMSE / m": lambda v: f"{v['rmse_m']:.3f} ± {v['rmse_standard_error_m']:.1g}",
         "ranges taken": lambda v: f"{v['ranges_taken']}",
         "full weight": lambda v: f"{100 * v['full_weight']:.1f} %",
@@ -336,8 +249,12 @@ def _table(values: dict[str, Any], settings: dict[str, Any]) -> Table:
         "NIS, mean (1 expected)": lambda v: f"{v.get('nis_mean', np.nan):.3f}",
         "NEES, mean (2 expected)": lambda v: f"{v['nees_mean']:.3f}",
     }
-    for title, cell in rows.items():
-        table.add_row(title, *(cell(v) for v in shown.values()))
+    rows = [(name, *(cell(v) for v in shown.values())) for name, cell in cells.items()]
     if "improvement" in values:
-        table.add_row("improvement", "", f"{100 * values['improvement']:.1f} %")
-    return table
+        rows.append(("improvement", "", f"{100 * values['improvement']:.1f} %"))
+    title = (
+        f"{settings['filter'].upper()} and {settings['kernel']['name']}: {scenario['runs']} "
+        f"runs of {scenario['steps']} s, {noise['kind']} noise, timing {scenario['timing']}, "
+        f"seed {scenario['seed']}, {settings['dtype']}"
+    )
+    return table(title, ("quantity", *shown), rows, right={1, 2})

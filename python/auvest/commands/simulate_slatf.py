@@ -1,4 +1,18 @@
-"""``auvest simulate slatf``: the SLATF paper's scenario with any filter and noise."""
+"""``auvest simulate slatf``: the SLATF paper's scenario with any filter and noise.
+
+Communication fails for 400 s; a slave that can only dead-reckon pings its master (Lu, Chen, Liu,
+Ma, He 2020, section 7). Finished runs are kept: the same command goes on where it was stopped.
+
+Examples
+--------
+  auvest simulate slatf
+
+  auvest simulate slatf --filter slatf1 --level 4 --particles 1000
+
+  auvest simulate slatf --masters 3 --association unknown --gate 16
+
+  auvest simulate slatf --filter ekf-slat --runs 1000 --table parquet --json > ekf.json
+"""
 
 from __future__ import annotations
 
@@ -11,12 +25,20 @@ import numpy.typing as npt
 import typer
 from rich.table import Table
 
-from auvest import Status, metrics, montecarlo
-from auvest.commands import options
+from auvest import metrics, montecarlo
+from auvest.commands import console, options
 from auvest.commands.console import Terminal
-from auvest.commands.exit_codes import ExitCode
-from auvest.commands.files import write_csv, write_results
-from auvest.commands.options import FILTER, WORLD, refuse_given
+from auvest.commands.files import write_csv
+from auvest.commands.options import (
+    FILTER,
+    WORLD,
+    fraction,
+    not_negative,
+    option,
+    positive,
+    refuse_given,
+)
+from auvest.commands.session import Floats, Session, failure, mean_over_runs
 from auvest.commands.version import version
 from auvest.scenarios.paper_aukf import DTypeName
 from auvest.scenarios.paper_slatf import LEVELS, PARTICLES, RUNS
@@ -33,24 +55,6 @@ from auvest.slat import (
     SlatfJoint,
 )
 
-Floats = npt.NDArray[np.float64]
-
-HELP = """\
-Communication fails for 400 s; a slave that can only dead-reckon pings its master (Lu, Chen, Liu,
-Ma, He 2020, section 7). Finished runs are kept: the same command goes on where it was stopped.
-
-Examples:
-
-  auvest simulate slatf
-
-  auvest simulate slatf --filter slatf1 --level 4 --particles 1000
-
-  auvest simulate slatf --masters 3 --association unknown --gate 16
-
-  auvest simulate slatf --filter ekf-slat --runs 1000 --table parquet --json > ekf.json
-"""
-
-
 FilterOption = Literal["slatf1", "slatf2", "slatf-joint", "ekf-slat", "dead-reckoning"]
 _PARTICLE_FILTERS: tuple[FilterOption, ...] = ("slatf1", "slatf2", "slatf-joint")
 _TITLES: dict[FilterOption, str] = {
@@ -64,123 +68,71 @@ _TITLES: dict[FilterOption, str] = {
 
 def command(
     ctx: typer.Context,
-    filter_name: Annotated[
-        FilterOption, typer.Option("--filter", help="The filter.", rich_help_panel=FILTER)
-    ] = "slatf2",
+    filter_name: Annotated[FilterOption, option(FILTER, "The filter.", "--filter")] = "slatf2",
     particles: Annotated[
-        int,
-        typer.Option(
-            min=1,
-            max=1_000_000,
-            help="N (slatf1, slatf2, slatf-joint).",
-            rich_help_panel=FILTER,
-        ),
+        int, option(FILTER, "N (slatf1, slatf2, slatf-joint).", min=1, max=1_000_000)
     ] = PARTICLES,
     resampling: Annotated[
-        Resampling,
-        typer.Option(
-            help="Resampling policy (slatf1, slatf2, slatf-joint).", rich_help_panel=FILTER
-        ),
+        Resampling, option(FILTER, "Resampling policy (slatf1, slatf2, slatf-joint).")
     ] = "systematic",
     gate: Annotated[
         float,
-        typer.Option(
-            callback=options.not_negative,
-            help="NIS beyond which an echo says nothing; 0: no gate.",
-            rich_help_panel=FILTER,
-        ),
+        option(FILTER, "NIS beyond which an echo says nothing; 0: no gate.", check=not_negative),
     ] = 0.0,
     heading_bias: Annotated[
         Literal["compensate", "keep"],
-        typer.Option(
-            help="Bias of the heading's noise: make up for it, or keep it, as in the paper.",
-            rich_help_panel=FILTER,
-        ),
+        option(FILTER, "Bias of the heading's noise: make up for it, or keep it, as in the paper."),
     ] = "compensate",
     dtype: options.Precision = "float64",
     lanes: Annotated[
         Lanes | None,
-        typer.Option(
-            help="Instruction set of the particles; the bits are the same.",
+        option(
+            FILTER,
+            "Instruction set of the particles; the bits are the same.",
             show_default="the widest here",
-            rich_help_panel=FILTER,
         ),
     ] = None,
-    level: Annotated[
-        int,
-        typer.Option(
-            min=1, max=len(LEVELS), help="Noise level of section 7.", rich_help_panel=WORLD
-        ),
-    ] = 3,
+    level: Annotated[int, option(WORLD, "Noise level of section 7.", min=1, max=len(LEVELS))] = 3,
     range_noise: Annotated[
         float | None,
-        typer.Option(
-            callback=options.positive,
-            help="Noise of the range, m.",
-            show_default="of the level",
-            rich_help_panel=WORLD,
-        ),
+        option(WORLD, "Noise of the range, m.", check=positive, show_default="of the level"),
     ] = None,
     bearing_noise: Annotated[
         float | None,
-        typer.Option(
-            callback=options.positive,
-            help="Noise of the bearing, rad.",
-            show_default="of the level",
-            rich_help_panel=WORLD,
-        ),
+        option(WORLD, "Noise of the bearing, rad.", check=positive, show_default="of the level"),
     ] = None,
-    masters: Annotated[
-        int, typer.Option(min=1, max=MAX_MASTERS, help="Masters.", rich_help_panel=WORLD)
-    ] = 1,
+    masters: Annotated[int, option(WORLD, "Masters.", min=1, max=MAX_MASTERS)] = 1,
     association: Annotated[
-        Literal["known", "unknown"],
-        typer.Option(help="Whether the slave knows whose echo it hears.", rich_help_panel=WORLD),
+        Literal["known", "unknown"], option(WORLD, "Whether the slave knows whose echo it hears.")
     ] = "known",
     plan: Annotated[
         Literal["known", "unknown"],
-        typer.Option(
-            help="Whether the slave knows how the masters turn, u of Eq. (4).",
-            rich_help_panel=WORLD,
-        ),
+        option(WORLD, "Whether the slave knows how the masters turn, u of Eq. (4)."),
     ] = "known",
     dropout: Annotated[
-        float,
-        typer.Option(
-            callback=options.fraction,
-            help="Probability that an echo is lost.",
-            rich_help_panel=WORLD,
-        ),
+        float, option(WORLD, "Probability that an echo is lost.", check=fraction)
     ] = 0.0,
     outlier: Annotated[
         float,
-        typer.Option(
-            callback=options.fraction,
-            help="Probability that an echo is wrong by 100 standard deviations.",
-            rich_help_panel=WORLD,
+        option(
+            WORLD, "Probability that an echo is wrong by 100 standard deviations.", check=fraction
         ),
     ] = 0.0,
     duration: Annotated[
-        float,
-        typer.Option(
-            callback=options.positive,
-            help="Length of the outage, s.",
-            rich_help_panel=WORLD,
-        ),
+        float, option(WORLD, "Length of the outage, s.", check=positive)
     ] = SlatScenario().duration_s,
     runs: options.Runs = RUNS,
     seed: options.Seed = 1,
     workers: options.Workers = None,
     output: options.Output = Path("auvest-output/simulate-slatf"),
     table: Annotated[
-        Literal["csv", "parquet"],
-        typer.Option(help="Format of the table of runs.", rich_help_panel="Output"),
+        Literal["csv", "parquet"], option("Output", "Format of the table of runs.")
     ] = "csv",
     no_figure: options.NoFigure = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Simulate; the help text is :data:`HELP`."""
+    """Simulate; the help text is the module's."""
     terminal = Terminal(as_json=as_json, quiet=quiet)
     if filter_name not in _PARTICLE_FILTERS:
         refuse_given(ctx, ("particles", "resampling"), "belongs to slatf1, slatf2 and slatf-joint.")
@@ -225,26 +177,19 @@ def command(
         "dtype": dtype,
         "scenario": asdict(scenario),
     }
-    terminal.make_folder(output)
-
-    interrupted = False
+    session = Session(terminal, output, "simulate slatf", settings)
     store = output / ".runs"
-    with terminal.progress("runs") as progress, terminal.writing(output):
-        try:
-            result = simulate(
-                filter_,
-                scenario,
-                workers=workers,
-                progress=progress,
-                store=store,
-                settings=_identity(settings),
-            )
-        except montecarlo.Interrupted as stop:
-            interrupted = True
-            if stop.partial is None:
-                terminal.fail("interrupted: no run was done", ExitCode.INTERRUPTED)
-            result = stop.partial
-
+    with terminal.writing(output):
+        result = session.run(
+            simulate,
+            filter_,
+            scenario,
+            workers=workers,
+            store=store,
+            settings=_identity(settings),
+        )
+    if result is None:
+        session.nothing_done()
     values = measures(result)
     per_ping = means_per_ping(result)
     with terminal.writing(output):
@@ -254,33 +199,12 @@ def command(
         }
         if not no_figure:
             files["figure"] = _draw(output / "figure.png", result, _TITLES[filter_name])
-        document = {
-            "command": "simulate slatf",
-            "version": version(),
-            "settings": settings,
-            "complete": not interrupted,
-            "results": values,
-            "per_ping": per_ping,
-        }
-        write_results(output, document, files)
-
-    terminal.result_json(document)
-    terminal.result(_table(values, scenario, _TITLES[filter_name]))
-    terminal.files(files)
-    if interrupted:
-        terminal.fail(
-            f"interrupted: {values['runs']} of {runs} runs are done and kept; the same command "
-            "goes on from there",
-            ExitCode.INTERRUPTED,
-        )
-    montecarlo.discard(store)
-    if values["failed_runs"]:
-        first = int(np.flatnonzero(result.failed)[0])
-        terminal.fail(
-            f"{values['failed_runs']} of {values['runs']} runs failed; the first, run {first}: "
-            f"{Status(int(result.status[first])).name}",
-            ExitCode.FAILED,
-        )
+    title = _TITLES[filter_name]
+    session.report(values, files, _table(values, scenario, title), per_ping=per_ping)
+    kept = f"{values['runs']} of {runs} runs are done and kept; the same command goes on from there"
+    if not session.interrupted:
+        montecarlo.discard(store)
+    session.end(kept, failure(result))
 
 
 def _filter(
@@ -296,35 +220,19 @@ def _filter(
 ) -> SlatFilter:
     x0 = np.array([scenario.slave.x_m, scenario.slave.y_m])
     P0 = np.zeros((2, 2))
-    motion = replace(scenario.motion, compensate_bias=compensate_bias)
+    options: dict[str, Any] = {
+        "motion": replace(scenario.motion, compensate_bias=compensate_bias),
+        "dtype": dtype,
+    }
     if name == "dead-reckoning":
-        return DeadReckoning(x0, P0, motion=motion, dtype=dtype)
+        return DeadReckoning(x0, P0, **options)
+    options.update(sonar=scenario.sonar, gate=gate)
     if name == "ekf-slat":
-        return EkfSlat(x0, P0, motion=motion, sonar=scenario.sonar, gate=gate, dtype=dtype)
+        return EkfSlat(x0, P0, **options)
+    options.update(particles=particles, resampling=resampling)
     if name == "slatf-joint":
-        return SlatfJoint(
-            x0,
-            P0,
-            particles=particles,
-            motion=motion,
-            sonar=scenario.sonar,
-            resampling=resampling,
-            gate=gate,
-            max_masters=len(scenario.masters),
-            dtype=dtype,
-        )
-    return Slatf(
-        x0,
-        P0,
-        version=1 if name == "slatf1" else 2,
-        particles=particles,
-        motion=motion,
-        sonar=scenario.sonar,
-        resampling=resampling,
-        gate=gate,
-        lanes=lanes,
-        dtype=dtype,
-    )
+        return SlatfJoint(x0, P0, max_masters=len(scenario.masters), **options)
+    return Slatf(x0, P0, version=1 if name == "slatf1" else 2, lanes=lanes, **options)
 
 
 def _identity(settings: dict[str, Any]) -> dict[str, Any]:
@@ -342,7 +250,7 @@ def measures(result: SlatResult) -> dict[str, Any]:
         "rmse_m": result.rmse_m,
         "rmse_standard_error_m": result.rmse_standard_error_m,
         "mean_error_m": float(np.nanmean(result.distance_m)),
-        "end_error_m": float(np.sqrt(_mean(np.square(result.distance_m[:, -1:]))[0])),
+        "end_error_m": float(np.sqrt(mean_over_runs(np.square(result.distance_m[:, -1:]))[0])),
         "master_rmse_m": metrics.rmse(result.master_error),
         "nees_mean": float(np.nanmean(result.nees)),
         "covered_95": result.covered,
@@ -356,11 +264,11 @@ def means_per_ping(result: SlatResult) -> dict[str, Floats]:
     master = np.square(result.master_error).sum(axis=-1).mean(axis=-1)
     return {
         "time_s": result.time_s,
-        "rms_error_m": np.sqrt(_mean(np.square(result.distance_m))),
-        "mean_error_m": _mean(result.distance_m),
-        "master_rms_error_m": np.sqrt(_mean(master)),
-        "nees": _mean(result.nees),
-        "effective_size": _mean(result.effective_size),
+        "rms_error_m": np.sqrt(mean_over_runs(np.square(result.distance_m))),
+        "mean_error_m": mean_over_runs(result.distance_m),
+        "master_rms_error_m": np.sqrt(mean_over_runs(master)),
+        "nees": mean_over_runs(result.nees),
+        "effective_size": mean_over_runs(result.effective_size),
     }
 
 
@@ -376,14 +284,6 @@ def per_run(result: SlatResult) -> dict[str, npt.NDArray[Any]]:
         "log_likelihood": result.log_likelihood,
         "status": result.status,
     }
-
-
-def _mean(values: Floats) -> Floats:
-    """Mean over the runs of what is known at each ping."""
-    known = ~np.isnan(values)
-    count = known.sum(axis=0)
-    total = np.where(known, values, 0.0).sum(axis=0)
-    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
 def _draw(path: Path, result: SlatResult, title: str) -> Path:
@@ -407,15 +307,6 @@ def _draw(path: Path, result: SlatResult, title: str) -> Path:
 
 
 def _table(values: dict[str, Any], scenario: SlatScenario, title: str) -> Table:
-    table = Table(
-        title=f"{title}: {values['runs']} runs of {scenario.duration_s:g} s, sonar "
-        f"{scenario.sigma_range_m:g} m, {scenario.sigma_bearing_rad:g} rad, "
-        f"{len(scenario.masters)} master(s), seed {scenario.seed}",
-        title_justify="left",
-        title_style="bold",
-    )
-    table.add_column("measure")
-    table.add_column("value", justify="right")
     rows = {
         "position RMSE / m": f"{values['rmse_m']:.2f} ± {values['rmse_standard_error_m']:.2f}",
         "mean error / m": f"{values['mean_error_m']:.2f}",
@@ -427,6 +318,9 @@ def _table(values: dict[str, Any], scenario: SlatScenario, title: str) -> Table:
         "echoes per run": f"{values['echoes_per_run']:.1f}",
         "failed runs": f"{values['failed_runs']}",
     }
-    for name, value in rows.items():
-        table.add_row(name, value)
-    return table
+    text = (
+        f"{title}: {values['runs']} runs of {scenario.duration_s:g} s, sonar "
+        f"{scenario.sigma_range_m:g} m, {scenario.sigma_bearing_rad:g} rad, "
+        f"{len(scenario.masters)} master(s), seed {scenario.seed}"
+    )
+    return console.table(text, ("measure", "value"), rows.items(), right={1})

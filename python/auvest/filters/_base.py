@@ -99,9 +99,9 @@ class GaussianFilter:
                 )
         self._recovery = recovery
         if policy is not None:
-            as_instance("policy", policy, IntervalPolicy.__args__)  # type: ignore[attr-defined]
+            as_instance("policy", policy, IntervalPolicy.__args__)
         self._policy = policy
-        self._options = {
+        self._options: dict[str, Any] = {
             "late_s": as_number("late_s", late_s, "not negative"),
             "residual": as_kind("residual", residual, ("innovation", "post-fit")),
             "max_iterations": as_integer("max_iterations", max_iterations, 2, 255),
@@ -111,7 +111,7 @@ class GaussianFilter:
         states = len(self._process.state)
         state = as_array("x0", x0, (states,), self._dtype)
         covariance = as_covariance("P0", P0, states, self._dtype)
-        start = state[:2].copy()
+        start = state[[0, min(1, states - 1)]]
         if reference is not None:
             start = as_array("reference", reference, (2,), self._dtype)
         self._build()
@@ -488,9 +488,10 @@ class GaussianFilter:
             columns["interval_s"] = None
         if self.late_s == 0:
             columns["too_late"] = None
-        result = RunResult(
-            **{key: None if column is None else column[:done] for key, column in columns.items()}
-        )
+        kept: dict[str, Any] = {
+            key: None if column is None else column[:done] for key, column in columns.items()
+        }
+        result = RunResult(**kept)
         if status != Status.ok:
             error = FilterError("run", status, step=done, partial=result)
             try:
@@ -549,7 +550,7 @@ class GaussianFilter:
         own = {handle.description: handle for handle in self._handles.values()}
         handles = [own.get(json.dumps(model)) or self._rebuilt(model) for model in models]
         events = [None if k < 0 else handles[k] for k in arrays.pop("event_sensor")]
-        report = None
+        report: dict[str, Any] | None = None
         if "report_nis" in arrays:
             flags = [int(flag) for flag in arrays.pop("report_flags")]
             report = {name: arrays.pop(f"report_{name}").ravel() for name in _REPORT}
@@ -705,7 +706,7 @@ class GaussianFilter:
     def _as_place(self, place: npt.ArrayLike, handle: _Sensor[Any]) -> Floats:
         if handle.place == 0:
             raise TypeError("place must be None: the place of this sensor is no part of its model")
-        given = np.atleast_1d(place) if handle.place == 1 else place  # type: ignore[arg-type]
+        given = np.atleast_1d(place) if handle.place == 1 else place
         return as_array("place", given, (handle.place,), self._dtype)
 
     def _as_places(

@@ -139,5 +139,5 @@ class Aukf(Ukf):
         policy: IntervalPolicy = _LAW,
         **options: Any,
     ) -> None:
-        as_instance("policy", policy, IntervalPolicy.__args__)  # type: ignore[attr-defined]
+        as_instance("policy", policy, IntervalPolicy.__args__)
         super().__init__(x0, P0, process=process, sensors=sensors, policy=policy, **options)

@@ -138,9 +138,9 @@ class ProcessModel(Model):
         """Jacobian (n, n) of ``f`` at ``x``, in float64; a linear process needs no ``x``."""
         if self.lacks:
             raise ValueError(f"{type(self).__name__} has no {self.lacks}")
-        state = np.zeros(len(self.state))
+        state: npt.NDArray[np.float64] = np.zeros(len(self.state))
         if x is not None:
-            state = as_array("x", x, (len(self.state),), _FLOAT64)
+            state = as_array("x", x, (len(self.state),), _FLOAT64).astype(np.float64)
         phi: npt.NDArray[np.float64] = self.core(_FLOAT64).Phi(
             state, as_number("dt", dt, "not negative"), self._as_input(input)
         )
@@ -156,7 +156,7 @@ class ProcessModel(Model):
     def _as_input(self, input: npt.ArrayLike | None) -> npt.NDArray[np.float64]:
         if input is None:
             return np.zeros(len(self.input))
-        return as_array("input", input, (len(self.input),), _FLOAT64)
+        return as_array("input", input, (len(self.input),), _FLOAT64).astype(np.float64)
 
 
 class MeasurementModel(Model):

@@ -173,7 +173,8 @@ class FunctionSensor(MeasurementModel):
         self.function = _as_function("h", h)
         size = 1 if np.ndim(R) == 0 else np.shape(R)[0]
         as_integer("the size of R", size, 1, _core.MAX_FUNCTION_SIZE)
-        self.R = as_covariance("R", np.reshape(R, (1, 1)) if np.ndim(R) == 0 else R, size, _FLOAT64)
+        square = np.reshape(R, (1, 1)) if np.ndim(R) == 0 else R
+        self.R = as_covariance("R", square, size, _FLOAT64).astype(np.float64)
         if np.linalg.eigvalsh(self.R)[0] <= 0:
             raise ValueError("R must be positive definite")
         self.measures = tuple(f"z_{i}" for i in range(size))

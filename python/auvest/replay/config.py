@@ -14,7 +14,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-FilterName: TypeAlias = Literal["ekf", "robust-ekf", "ukf", "robust-ukf", "aukf"]
+FilterName: TypeAlias = Literal["ekf", "ukf", "ckf", "aukf", "robust-ekf", "robust-ukf"]
 KernelName: TypeAlias = Literal["huber", "hampel", "igg"]
 PolicyName: TypeAlias = Literal["fixed", "covariance-budget", "mahalanobis"]
 

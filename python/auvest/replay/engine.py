@@ -17,10 +17,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+import auvest
+from auvest import registry
 from auvest._arguments import Floats
-from auvest.filters import Aukf, Ekf, RunResult, Ukf
+from auvest.filters import Aukf, GaussianFilter, RobustEkf, RobustUkf, RunResult, Ukf
 from auvest.intervals import CovarianceBudget, FixedInterval, IntervalPolicy, MahalanobisInterval
-from auvest.kernels import RejectionStreak
 from auvest.logs import LogError, LogFolder, Stream, merge
 from auvest.logs.reader import Rows
 from auvest.models import ConstantAcceleration, LeaderRange, Odometry, RangeBearing
@@ -46,7 +47,8 @@ class Replay(ABC):
         The log.
     settings : Settings
         Filter, noise and the rest.
-    filter_name : {"ekf", "robust-ekf", "ukf", "robust-ukf", "aukf"}
+    filter_name : str
+        One of :func:`auvest.registry.replayable`.
         The filter.
 
     Attributes
@@ -405,7 +407,7 @@ class Tracker(Replay):
         if self.filter_name == "aukf":
             policy = interval_policy(self.settings.interval)
             alpha = self.settings.filter.alpha
-            self._filter: Ekf | Ukf = Aukf(x0, P0, policy=policy, alpha=alpha, **models)
+            self._filter: GaussianFilter = Aukf(x0, P0, policy=policy, alpha=alpha, **models)
         else:
             self._filter = _build(self.filter_name, self.settings, x0, P0, models)
         self._now, self._started = time, True
@@ -454,7 +456,7 @@ class Tracker(Replay):
 
     def _fuse(
         self,
-        tracker: Ekf | Ukf,
+        tracker: GaussianFilter,
         fixes: Rows,
         places: Rows,
         used: npt.NDArray[np.bool_],
@@ -512,14 +514,15 @@ class Tracker(Replay):
 
 def _build(
     name: FilterName, settings: Settings, x0: Rows, P0: Rows, models: dict[str, Any]
-) -> Ekf | Ukf:
-    """Make a filter, robust if its name says so."""
-    robust = name.startswith("robust")
-    if robust:
-        models["kernel"], models["recovery"] = settings.filter.kernel, RejectionStreak()
-    if name.endswith("ukf"):
-        return Ukf(x0, P0, alpha=settings.filter.alpha, **models)
-    return Ekf(x0, P0, **models)
+) -> GaussianFilter:
+    """Make the filter of this name, with what the settings say of its kind."""
+    entry = registry.filter_named(name, registry.replayable())
+    kind: type[GaussianFilter] = getattr(auvest, entry.cls)
+    if issubclass(kind, (RobustEkf, RobustUkf)):
+        models["kernel"] = settings.filter.kernel
+    if issubclass(kind, Ukf):
+        models["alpha"] = settings.filter.alpha
+    return kind(x0, P0, **models)
 
 
 def interval_policy(settings: IntervalSettings) -> IntervalPolicy:

@@ -2,7 +2,20 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
+from importlib import resources
+from typing import Any, Generic, TypeVar
+
+from auvest.reproduce import markdown
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+T = TypeVar("T")
 
 YES = "reproduced"
 PARTLY = "partly reproduced"
@@ -23,9 +36,46 @@ class Claim:
         return asdict(self)
 
 
+class Claims(Generic[T]):
+    """The texts of claims.toml beside a module; called, it makes a claim of one.
+
+    Parameters
+    ----------
+    module : str
+        Name of the module.
+    make : callable
+        Takes the three texts (where, what is claimed, what is measured) and the verdict.
+    """
+
+    def __init__(self, module: str, make: Callable[..., T]) -> None:
+        file = resources.files(module.rpartition(".")[0]).joinpath("claims.toml")
+        self._texts: dict[str, dict[str, str]] = tomllib.loads(file.read_text(encoding="utf-8"))
+        self._make = make
+
+    def __call__(self, name: str, verdict: object, /, **values: Any) -> T:
+        """Fill the places of the texts of that name."""
+        texts = (" ".join(text.split()) for text in self._texts[name].values())
+        return self._make(*(text.format(**values) for text in texts), verdict)
+
+
+def graded(yes: bool = False, *, partly: bool = False) -> str:
+    """Make a verdict."""
+    return YES if yes else PARTLY if partly else NO
+
+
 def tally(judged: list[Claim]) -> str:
     """Count the verdicts, in words."""
     counts: dict[str, int] = {}
     for claim in judged:
         counts[claim.verdict] = counts.get(claim.verdict, 0) + 1
     return "; ".join(f"{count} {verdict}" for verdict, count in counts.items())
+
+
+def claim_rows(judged: Iterable[Claim]) -> str:
+    """Lay out claims and verdicts for a page: where, the paper, measured, verdict."""
+    return markdown.rows((c.where, c.paper, c.measured, f"**{c.verdict}**") for c in judged)
+
+
+def assumption_rows(assumptions: Iterable[Any]) -> str:
+    """Lay out what a paper leaves open: quantity, paper, ours and reason of each."""
+    return markdown.rows((a.quantity, a.paper, a.ours, a.reason) for a in assumptions)

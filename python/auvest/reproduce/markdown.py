@@ -4,13 +4,27 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterable, Sequence
+from importlib import resources
+from typing import Any
 
 
-def table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+def page(module: str, **values: Any) -> str:
+    """Fill the template page.md beside a module: ``{name}``, with a format or an attribute."""
+    folder = resources.files(module.rpartition(".")[0])
+    template = folder.joinpath("page.md").read_text(encoding="utf-8")
+    placed = {name: v.strip("\n") if isinstance(v, str) else v for name, v in values.items()}
+    return fill(template.format(**placed)).rstrip("\n") + "\n"
+
+
+def table(header: Sequence[str], cells: Iterable[Sequence[object]]) -> str:
     """Make a table; a cell may hold anything that prints, bars and line breaks are escaped."""
-    lines = [_row(header), "|" + "|".join(" --- " for _ in header) + "|"]
-    lines += [_row(row) for row in rows]
-    return "\n".join(lines) + "\n"
+    head = _row(header) + "\n|" + "|".join(" --- " for _ in header) + "|\n"
+    return head + rows(cells) + "\n"
+
+
+def rows(cells: Iterable[Sequence[object]]) -> str:
+    """Make the rows of a table whose head stands in the template."""
+    return "\n".join(map(_row, cells))
 
 
 def number(value: float, digits: int = 3) -> str:

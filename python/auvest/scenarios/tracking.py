@@ -29,7 +29,7 @@ from auvest.intervals import FixedInterval
 from auvest.models import ConstantAcceleration, RangeBearing
 
 if TYPE_CHECKING:
-    from auvest._core import _ScenarioDict, _Sensor
+    from auvest._core import _ScenarioDict
 
 _TRACK = _core.track_defaults()
 _NOISE = _core.noise_defaults()
@@ -342,7 +342,8 @@ def simulate(
     as_instance("filter", filter, (Ekf, Ukf))
     as_instance("scenario", scenario, Scenario)
     policy = filter.policy or FixedInterval(interval_s=scenario.interval_s)
-    core, sensor, x0, p0 = filter._core_filter(policy), station(filter), filter.x, filter.P
+    core, x0, p0 = filter._core_filter(policy), filter.x, filter.P
+    sensor = sensor_of(filter).core(6, filter.dtype)
 
     def part(first: int, count: int) -> dict[str, npt.NDArray[Any]]:
         return _core.simulate_tracking(core, x0, p0, sensor, _as_core(scenario, first, count))
@@ -362,8 +363,8 @@ def simulate(
     return TrackingResult(**columns, scenario=scenario)
 
 
-def station(filter: Ekf | Ukf) -> _Sensor[Any]:  # noqa: A002 (its name in this package)
-    """Give the core's sensor of a filter whose only sensor is a range and bearing.
+def sensor_of(filter: Ekf | Ukf) -> RangeBearing:  # noqa: A002 (its name in this package)
+    """Give the range and bearing that is a filter's only sensor.
 
     Raises
     ------
@@ -375,7 +376,7 @@ def station(filter: Ekf | Ukf) -> _Sensor[Any]:  # noqa: A002 (its name in this 
         raise ValueError(f"filter must have a ConstantAcceleration, not {filter.process}")
     if len(sensors) != 1 or not isinstance(sensors[0], RangeBearing):
         raise ValueError(f"filter must have one RangeBearing as its sensor, not {sensors}")
-    return sensors[0].core(6, filter.dtype)
+    return sensors[0]
 
 
 def _as_core(scenario: Scenario, first: int, count: int) -> _ScenarioDict:

@@ -383,4 +383,28 @@ TEST_CASE("lock-out: outliers are hardly ever taken for a wrong prior") {
   CHECK(false_recoveries(30) <= 1);
 }
 
+TEST_CASE("what does not see the position does not widen it") {
+  Streak streak{[] {
+    Streak::Params params;
+    params.rejections = 1;
+    return params;
+  }()};
+  auvest::Belief<double, 4> belief;
+  belief.P = Matrix<double, 4, 4>::Identity();
+  const Matrix<double, 4, 4> root = belief.P;
+  auvest::RobustCorrection<double, 1> correction;
+  correction.weight(0) = 0;
+  correction.innovation(0) = 30;
+  correction.S(0, 0) = 1;
+  Matrix<double, 1, 4> a = Matrix<double, 1, 4>::Zero();
+  a(0, 2) = 1;  // a velocity
+  a(0, 0) = 1e-12;
+  CHECK(streak.after(correction, a, root, belief));
+  CHECK(belief.P(0, 0) == 1);
+  // One that sees a thousandth of it asks for 30^2 - 1 over the square of that, which is in range.
+  a(0, 0) = 1e-3;
+  CHECK(streak.after(correction, a, root, belief));
+  CHECK(belief.P(0, 0) == doctest::Approx(1 + 899e6));
+}
+
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include <Eigen/LU>
 #include <cmath>
+#include <utility>
 
 #include "auvest/models/piecewise_acceleration.hpp"
 #include "auvest/models/slave_motion.hpp"
@@ -15,7 +16,7 @@ namespace {
 
 using auvest::Belief;
 using auvest::kUnknownMaster;
-using auvest::Sighting;
+using auvest::Echo;
 using auvest::Vector;
 using Compass = auvest::CompassMotion<double>;
 using Unicycle = auvest::UnicycleMotion<double>;
@@ -44,7 +45,7 @@ struct SideBySide {
   using Model = auvest::JointGaussian<Compass, Master, 3>;
   static constexpr int kStates = Model::kStates;
   Model::Joint joint;
-  Sighting<double> echoes[2];
+  Echo<double> echoes[2];
   const auvest::Sonar<double> sonar = precise();
 
   SideBySide() {

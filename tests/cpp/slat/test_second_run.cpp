@@ -13,7 +13,8 @@
 namespace {
 
 using namespace slat_test;
-using auvest::Sighting;
+using Pair = auvest::Vector<float, 2>;
+using auvest::Echo;
 using auvest::Status;
 using auvest::math::Random;
 
@@ -38,8 +39,8 @@ typename Filter::MasterBelief master_at(float x) {
   return master;
 }
 
-Sighting<float> echo_of(int master, float range, float bearing) {
-  Sighting<float> seen;
+Echo<float> echo_of(int master, float range, float bearing) {
+  Echo<float> seen;
   seen.master = master;
   seen.z << range, bearing;
   return seen;
@@ -52,8 +53,8 @@ void run(Filter& filter, Random& random, int pings) {
   REQUIRE(filter.add_master(master_at<Filter>(100)) == Status::kOk);
   REQUIRE(filter.add_master(master_at<Filter>(-200)) == Status::kOk);
   for (int k = 0; k < pings; ++k) {
-    REQUIRE(filter.predict(1, auvest::Vector<float, 2>(2, 0.1f), random) == Status::kOk);
-    const Sighting<float> seen[2] = {echo_of(0, 180.0f + float(k), -2.16f),
+    REQUIRE(filter.predict(1, Pair(2, 0.1f), random) == Status::kOk);
+    const Echo<float> seen[2] = {echo_of(0, 180.0f + float(k), -2.16f),
                                      echo_of(1, 250.0f - float(k), -0.65f)};
     REQUIRE(filter.update(seen, 1 + k % 2, sonar, random) == Status::kOk);
   }
@@ -108,12 +109,12 @@ TEST_CASE_TEMPLATE("second run: what is refused leaves no trace", Filter, FloatS
                    FloatSlatf2<2>, FloatJoint<2>, FloatEkf<2>, FloatImm<2>) {
   const float nan = std::nanf("");
   const auvest::Sonar<float> sonar;
-  const auvest::Vector<float, 2> u(2, 0.1f);
+  const Pair u(2, 0.1f);
   Gated<Filter> refused;
   Gated<Filter> other;
   Random random[2] = {Random(8), Random(8)};
   Filter& filter = refused.filter;
-  Sighting<float> seen[2] = {echo_of(0, 180, -2.16f), echo_of(1, 250, -0.65f)};
+  Echo<float> seen[2] = {echo_of(0, 180, -2.16f), echo_of(1, 250, -0.65f)};
   CHECK(filter.add_master(master_at<Filter>(0)) == Status::kNotInitialised);
   CHECK(filter.predict(1, u, random[0]) == Status::kNotInitialised);
   CHECK(filter.update(seen, 1, sonar, random[0]) == Status::kNotInitialised);
@@ -140,12 +141,12 @@ TEST_CASE_TEMPLATE("second run: what is refused leaves no trace", Filter, FloatS
   slave = slave_at<Filter>(1);
   slave.P(1, 0) = INFINITY;
   CHECK(filter.reset(slave, random[0]) == Status::kNotFinite);
-  const auvest::Vector<float, 2> plan[2] = {{0, 0}, {0, nan}};
+  const Pair plan[2] = {Pair(0, 0), Pair(0, nan)};
   CHECK(filter.predict(nan, u, random[0]) == Status::kNotFinite);
   CHECK(filter.predict(INFINITY, u, random[0]) == Status::kNotFinite);
   CHECK(filter.predict(-1, u, random[0]) == Status::kTimeBackwards);
-  CHECK(filter.predict(1, {nan, 0}, random[0]) == Status::kNotFinite);
-  CHECK(filter.predict(1, {2, INFINITY}, random[0]) == Status::kNotFinite);
+  CHECK(filter.predict(1, Pair(nan, 0), random[0]) == Status::kNotFinite);
+  CHECK(filter.predict(1, Pair(2, INFINITY), random[0]) == Status::kNotFinite);
   CHECK(filter.predict(1, u, random[0], plan) == Status::kNotFinite);
   CHECK(filter.update(seen, -1, sonar, random[0]) == Status::kBadParameter);
   CHECK(filter.update(seen, 3, sonar, random[0]) == Status::kBadParameter);
@@ -171,7 +172,7 @@ TEST_CASE_TEMPLATE("second run: what is refused leaves no trace", Filter, FloatS
 TEST_CASE("second run: dead reckoning forgets and refuses as the others do") {
   using Filter = auvest::DeadReckoning<FloatCompass>;
   const float nan = std::nanf("");
-  const auvest::Vector<float, 2> u(2, 0.1f);
+  const Pair u(2, 0.1f);
   Filter used{FloatCompass()};
   Random random(9);
   CHECK(used.predict(1, u, random) == Status::kNotInitialised);
@@ -191,7 +192,7 @@ TEST_CASE("second run: dead reckoning forgets and refuses as the others do") {
   start.P(1, 0) = nan;
   CHECK(used.reset(start, random) == Status::kNotFinite);
   CHECK(used.predict(nan, u, random) == Status::kNotFinite);
-  CHECK(used.predict(1, {2, nan}, random) == Status::kNotFinite);
+  CHECK(used.predict(1, Pair(2, nan), random) == Status::kNotFinite);
   CHECK(used.predict(-1, u, random) == Status::kTimeBackwards);
   CHECK(used.slave().x == before.x);
   CHECK(used.slave().P == before.P);

@@ -484,9 +484,15 @@ TEST_CASE_TEMPLATE("SLATF: unknown echoes of masters far apart do what known one
   CHECK(a.storage == b.storage);
 }
 
+/// The particles of a filter, to be put where a test wants them.
+template <class Filter>
+typename Filter::Set& particles_of(Filter& filter) {
+  return const_cast<typename Filter::Set&>(filter.set());
+}
+
 TEST_CASE("SLATF 1.0: a particle whose correction overflows weighs nothing, the others as before") {
   using Filter = auvest::Slatf1<Compass<float>, Master<float>, 1>;
-  typename Filter::Params params;
+  Filter::Params params;
   params.resample_below = 0;
   const int particles = 5;
   const auvest::Sonar<float> sonar;
@@ -502,18 +508,20 @@ TEST_CASE("SLATF 1.0: a particle whose correction overflows weighs nothing, the 
     REQUIRE(filter.reset(start, random) == Status::kOk);
     REQUIRE(filter.add_master(master_belief<float>(100, 150, 2, 1, 1)) == Status::kOk);
     if (overflows == 1) {
-      // Its velocity is at the end of the format, and the echo that moves the position moves it on.
+      // Its velocity is at the ends of the format, and the echo that moves x moves one part beyond.
       lost = static_cast<int>(std::max_element(weights[0].begin(), weights[0].end()) -
                               weights[0].begin());
-      *filter.set().at(lost, Filter::kMasterField + 2) = std::numeric_limits<float>::max();
-      *filter.set().at(lost, Filter::kMasterField + 6 + 3) = 1e36f;  // P(2, 0)
+      *particles_of(filter).at(lost, Filter::kMasterField + 2) = std::numeric_limits<float>::max();
+      *particles_of(filter).at(lost, Filter::kMasterField + 3) = std::numeric_limits<float>::lowest();
+      *particles_of(filter).at(lost, Filter::kMasterField + 6 + 3) = 1e36f;  // P(2, 0)
+      *particles_of(filter).at(lost, Filter::kMasterField + 6 + 6) = 1e36f;  // P(3, 0)
     }
-    Sighting<float> seen;
+    Echo<float> seen;
     seen.master = 0;
-    seen.z << 184, -2.16f;
+    seen.z << 181, -2.16f;
     REQUIRE(filter.update(&seen, 1, sonar, random) == Status::kOk);
     for (int i = 0; i < particles; ++i) {
-      weights[overflows].push_back(auvest::weight_of(filter.set().log_weight(i)));
+      weights[overflows].push_back(auvest::weight_of(filter.set().log_weights()[i]));
     }
     CHECK(std::isfinite(filter.log_likelihood()));
     if (overflows == 1) {  // and keeps what it believed
@@ -541,7 +549,7 @@ TEST_CASE("SLATF: a master is born where the echo comes from, as far as the slav
   device.bearing = auvest::Bearing::kFromHeading;
   device.sigma_range_m = 0.5;
   device.sigma_bearing_rad = 0.02;
-  Sighting<double> seen;
+  Echo<double> seen;
   seen.master = auvest::kUnknownMaster;
   seen.z << 100, 0.5;
   Belief<double, 3> start;
@@ -610,7 +618,7 @@ TEST_CASE_TEMPLATE("SLATF: a master is born from an echo that nobody expects, on
   REQUIRE(stepwise.filter.reset(start, by_step) == Status::kOk);
   REQUIRE(in_two.filter.reset(start, by_two) == Status::kOk);
   for (int k = 0; k < 4; ++k) {
-    Sighting<double> seen;
+    Echo<double> seen;
     seen.master = auvest::kUnknownMaster;
     seen.z << 100 + k, -2.4;
     const Vector<double, 2> u(1, 0.3);

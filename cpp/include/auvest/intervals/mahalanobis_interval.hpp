@@ -93,7 +93,7 @@ struct MahalanobisInterval {
     Steps steps;  // [AUKF 9]
     for (int i = 0; i < 2; ++i) {
       const Scalar error = m.last_estimate(i) - m.last_reference(i);
-      steps[0][i] = step(m.last_estimate(i), filter.x()(i < Filter::kStates ? i : 0));
+      steps[0][i] = step(m.last_estimate(i), coordinate(filter.x(), i));
       steps[1][i] = step(m.last_reference(i), reference(i));
       steps[2][i] = (m.last_estimate(i) - m.last_reference(i)) + error;
     }
@@ -123,6 +123,12 @@ struct MahalanobisInterval {
   }
 
  private:
+  /// x or y; of a state of one number, that number.
+  template <int N>
+  static Scalar coordinate(const Vector<Scalar, N>& x, int i) {
+    return x(i < N ? i : 0);
+  }
+
   /// Params() as a constant to copy: on a chip, half the flash of assignments.
   static const Params& defaults() {
     static const Params params;

@@ -166,13 +166,7 @@ struct RangeBearingElevation
       AUVEST_INLINE Lengths(Scalar p, Scalar qq) {
         using math::sqrt;
         const Scalar one = Scalar(1);
-        const Scalar uu = p * p + qq;
-        if (uu < Scalar(0.25) * math::machine_epsilon<Scalar>()) {
-          half_sum = Scalar(0.5) * qq;
-          half_difference = p;
-          return;
-        }
-        const Scalar w = one - uu;
+        const Scalar w = one - (p * p + qq);
         const Scalar a_plus = sqrt((one + p) * (one + p) + qq);
         const Scalar a_minus = sqrt((one - p) * (one - p) + qq);
         const Scalar a_sum = a_plus + a_minus;

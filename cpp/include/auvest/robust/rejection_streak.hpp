@@ -114,6 +114,15 @@ struct RejectionStreak {
     const Scalar length2 = math::dot(h.data(), h.data(), kPosition);
     const Scalar needed = (square - s) / length2;
     if (!math::is_finite(needed) || !math::is_finite(length2)) return kRejected;
+    if (O > kPosition) {
+      // A velocity does not see the position, and a belief far wider than the range hardly: what is
+      // left of h is rounding, and would ask for any variance.
+      Scalar known = Scalar(0);
+      for (int i = 0; i < kPosition; ++i) {
+        known = known + math::dot(&root(i, 0), &root(i, 0), i + 1);
+      }
+      if (!(needed < Scalar(1e10) * known)) return kRejected;
+    }
     if (needed > variance) variance = needed;
 
     // The same line: within 20 degrees. The same innovation: within three of its sigmas, and an

@@ -40,14 +40,15 @@ struct MasterEkf {
     sonar.look(pose, x, y, z, view);  // [SLATF 18] [SLATF 20] [SLATF 22]
     Matrix<Value, 2, 2> a;
     project(view.by_master, root, a);
-    const math::Mask<Value> finite =
-        potter<!math::is_number<Value>()>(a, noise, view.innovation, posterior);  // [SLATF 23]
+    const math::Mask<Value> finite = potter<!math::is_number<Value>()>(
+        a, noise, view.innovation, posterior);  // [SLATF 23] [SLATF 24]
     valid = finite && valid;
     if (gate > Scalar(0)) saturate(Value(gate), posterior);
   }
 
   /// [SLATF 25] and [SLATF 26]. False where the master cannot follow.
   AUVEST_INLINE math::Mask<Value> correct(Belief<Value, 6>& master) {
+    // [SLATF 25] [SLATF 26]
     const math::Mask<Value> finite = move_belief(master, root, slope, posterior);
     return finite && valid;
   }

@@ -23,7 +23,7 @@ struct MotionProposal {
   static AUVEST_INLINE void predict(const Motion& motion, const typename Motion::Step& step,
                                     const Value& a, const Value& b,
                                     Belief<Value, Motion::kStates>& pose) {
-    motion.sample(step, a, b, pose.x);  // [SLATF 10]
+    motion.sample(step, a, b, pose.x);  // [SLATF 10] [SLATF 12]
   }
 };
 

@@ -40,12 +40,14 @@ class SlatFilter {
   Scalar log_likelihood() const { return log_likelihood_; }  ///< of all echoes since reset
 
   /// Hands all numbers of the state to `visit`, which keeps them, or overwrites them by those that
-  /// were kept: to save a filter and to go on from there. `Self` is this class, const to save.
-  template <class Self, class Visit>
-  static void visit_state(Self& self, Visit& visit) {
-    visit.count(self.initialised_, true);
-    visit.count(self.masters_, Masters);
-    visit(self.log_likelihood_);
+  /// were kept: to save a filter and to go on from there.
+  template <class Visit>
+  static void visit_state(const SlatFilter& self, Visit& visit) {
+    visit_members(self, visit);
+  }
+  template <class Visit>
+  static void visit_state(SlatFilter& self, Visit& visit) {
+    visit_members(self, visit);
   }
 
  protected:
@@ -93,6 +95,14 @@ class SlatFilter {
   int masters_ = 0;
   Scalar log_likelihood_ = Scalar(0);
   bool initialised_ = false;
+
+ private:
+  template <class Self, class Visit>
+  static void visit_members(Self& self, Visit& visit) {
+    visit.count(self.initialised_, true);
+    visit.count(self.masters_, Masters);
+    visit(self.log_likelihood_);
+  }
 };
 
 /// The frame of a filter whose particles lie in a Set_ (particle_set.hpp).
@@ -117,12 +127,13 @@ class ParticleSlatFilter : public SlatFilter<Motion, Masters> {
   const Set& set() const { return set_; }
 
   /// As SlatFilter::visit_state.
-  template <class Self, class Visit>
-  static void visit_state(Self& self, Visit& visit) {
-    Frame::visit_state(self, visit);
-    visit(self.set_);
-    visit(self.effective_size_);
-    visit.count(self.resamplings_);
+  template <class Visit>
+  static void visit_state(const ParticleSlatFilter& self, Visit& visit) {
+    visit_members(self, visit);
+  }
+  template <class Visit>
+  static void visit_state(ParticleSlatFilter& self, Visit& visit) {
+    visit_members(self, visit);
   }
 
  protected:
@@ -170,6 +181,14 @@ class ParticleSlatFilter : public SlatFilter<Motion, Masters> {
   Set set_;
 
  private:
+  template <class Self, class Visit>
+  static void visit_members(Self& self, Visit& visit) {
+    Frame::visit_state(self, visit);
+    visit(self.set_);
+    visit(self.effective_size_);
+    visit.count(self.resamplings_);
+  }
+
   Resampling resampling_;
   int resamplings_ = 0;
   Scalar effective_size_ = Scalar(0);

@@ -271,6 +271,9 @@ class Slatf : public SlatfFrame<SlatfParticle<Motion_, Master_, Proposal_, Maste
   /// Section 6, steps 1 to 3, with the echoes: [SLATF 58] for 2.0, then one echo after the other.
   AUVEST_INLINE void correct(const Tile& tile, const Update& update) {
     Value chosen[Schedule::kGroups][Masters];
+    for (auto& group : chosen) {
+      for (Value& master : group) master = Value(0);  // compilers cannot see that it is set in time
+    }
     if (!update.all_known()) {
       tile.run(typename Particle::AssociateAndPropose{set_, update, masters_, chosen});
     } else if (Proposal::kInformed) {
@@ -289,9 +292,9 @@ class Slatf : public SlatfFrame<SlatfParticle<Motion_, Master_, Proposal_, Maste
   template <int Count>
   struct Models {};
 
-  /// Steps 2 and 3 for echo s and master n: [SLATF 22], [SLATF 23] and for 1.0 [SLATF 30], [SLATF
-  /// 31] by the first kernel, [SLATF 25] and [SLATF 26] by the second. Where it is not known whose
-  /// the echo is, in those particles that have chosen n.
+  /// Steps 2 and 3 for echo s and master n: by the first kernel [SLATF 22], [SLATF 23] and,
+  /// for 1.0, [SLATF 30] and [SLATF 31]; by the second [SLATF 25] and [SLATF 26]. Where it is not
+  /// known whose the echo is, in those particles that have chosen n.
   AUVEST_INLINE void correct_master(const Tile& tile, const Update& update, int s, int n,
                                     const Value (*chosen)[Masters], Models<1>) {
     MasterEkf<Value> ekfs[Schedule::kGroups];

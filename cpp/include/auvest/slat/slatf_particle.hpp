@@ -46,7 +46,7 @@ struct SlatfParticle {
 
   // ---- What it is ------------------------------------------------------------------------------
 
-  // The fields of [SLATF 9]: pose, its covariance (2.0), and the masters (master_bank.hpp).
+  // [SLATF 9], the fields: pose, its covariance (2.0), and the masters (master_bank.hpp).
   static constexpr int kPoseField = 0;
   static constexpr int kPoseNumbers = kPose + (Proposal::kInformed ? triangle_numbers(kPose) : 0);
   static constexpr int kMasterField = kPoseField + kPoseNumbers;

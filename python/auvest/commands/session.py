@@ -1,0 +1,109 @@
+"""What the commands have in common that run something and keep what was done: simulate, capture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NoReturn, TypeAlias, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+from rich.table import Table
+
+from auvest import Status
+from auvest.commands.console import Terminal
+from auvest.commands.exit_codes import ExitCode
+from auvest.commands.files import write_results
+from auvest.commands.version import version
+
+R = TypeVar("R")
+Floats: TypeAlias = npt.NDArray[np.float64]
+
+
+class Session:
+    """What happens from the first run to the exit code.
+
+    Parameters
+    ----------
+    terminal : Terminal
+        Where to write.
+    output : Path
+        The folder for the results; it is made.
+    command : str
+        The words after ``auvest``.
+    settings : dict
+        What the results depend on, for results.json.
+
+    Attributes
+    ----------
+    interrupted : bool
+        Ctrl-C came before all was done.
+    trouble : str
+        What else ended it before all was done.
+    """
+
+    def __init__(
+        self, terminal: Terminal, output: Path, command: str, settings: dict[str, Any]
+    ) -> None:
+        self.interrupted = False
+        self.trouble = ""
+        self._terminal = terminal
+        self._output = output
+        self._head = {"command": command, "version": version(), "settings": settings}
+        terminal.make_folder(output)
+
+    def run(
+        self, simulate: Callable[..., R], *arguments: Any, what: str = "runs", **options: Any
+    ) -> R | None:
+        """Do the runs; after Ctrl-C return those that are done, None if there are none."""
+        with self._terminal.progress(what) as progress:
+            try:
+                return simulate(*arguments, progress=progress, **options)
+            except KeyboardInterrupt as stop:
+                self.interrupted = True
+                partial: R | None = getattr(stop, "partial", None)
+                return partial
+
+    def nothing_done(self) -> NoReturn:
+        """End after Ctrl-C before the first run was done."""
+        self._terminal.fail("interrupted: no run was done", ExitCode.INTERRUPTED)
+
+    def report(
+        self, results: dict[str, Any], files: dict[str, Path], table: Table, **more: Any
+    ) -> None:
+        """Write results.json beside the files that are there, and print what was asked for."""
+        complete = not (self.interrupted or self.trouble)
+        document = {**self._head, "complete": complete, "results": results, **more}
+        with self._terminal.writing(self._output):
+            write_results(self._output, document, files)
+        self._terminal.result_json(document)
+        self._terminal.result(table)
+        self._terminal.files(files)
+
+    def end(self, kept: str, *failures: str) -> None:
+        """End with what was interrupted or failed, if anything was."""
+        if self.interrupted:
+            self._terminal.fail(f"interrupted: {kept}", ExitCode.INTERRUPTED)
+        for text in filter(None, failures):
+            self._terminal.fail(text, ExitCode.FAILED)
+
+
+def failure(result: Any, of: str = "") -> str:
+    """Say how many runs failed, and how the first did; nothing if none did."""
+    failed = np.flatnonzero(result.failed)
+    if not failed.size:
+        return ""
+    first = int(failed[0])
+    steps = f", after {int(result.samples[first])} steps" if hasattr(result, "samples") else ""
+    return (
+        f"{failed.size} of {len(result.status)} runs{of} failed; the first, run {first}{steps}: "
+        f"{Status(int(result.status[first])).name}"
+    )
+
+
+def mean_over_runs(values: Floats) -> Floats:
+    """Mean of each column over the rows that are known there; NaN where none is."""
+    known = np.isfinite(values)
+    count = known.sum(axis=0)
+    total = np.where(known, values, 0.0).sum(axis=0)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)

@@ -1,0 +1,1 @@
+"""The AUKF paper: Deng, Yin, Duan 2019."""

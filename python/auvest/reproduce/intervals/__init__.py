@@ -1,0 +1,1 @@
+"""The interval policies side by side; not in a paper."""

@@ -1,0 +1,1 @@
+"""The M-estimation EKF paper: Li, Du, Fan, Chen, Mao, Luo 2020."""

@@ -1,0 +1,1 @@
+"""SLATF and EKF-SLAT with an IMM master on real robots."""

@@ -1,0 +1,1 @@
+"""Cases in which SlatfJoint and the IMM earn their place."""

@@ -1,0 +1,1 @@
+"""The SLATF paper: Lu, Chen, Liu, Ma, He 2020."""
