@@ -10,7 +10,6 @@ from auvest.models.constant_acceleration import ConstantAcceleration
 from auvest.models.depth import Depth
 from auvest.models.functions import FunctionProcess, FunctionSensor, from_names
 from auvest.models.leader_range import LeaderRange
-from auvest.models.library import from_header
 from auvest.models.odometry import Odometry
 from auvest.models.position import Position
 from auvest.models.range_bearing import RangeBearing
@@ -42,6 +41,8 @@ def from_description(description: dict[str, Any]) -> Model:
     if name == "FunctionSensor":
         return from_names(params)
     if "header" in params:
+        from auvest.models.library import from_header  # most programs load no header
+
         return from_header(name, params)
     model = {**PROCESSES, **SENSORS}.get(name)
     if model is None:

@@ -264,22 +264,23 @@ def explain(output: str, header: Path, sources: dict[Path, str], log: Path) -> s
     """Cut the compiler's output to what concerns the user's files: one screen."""
     lines = {str(path): text.splitlines() for path, text in sources.items()}
     lines[header.name] = lines[str(header)]  # as #line has it
-    shown: dict[tuple[str, int, str], None] = {}
+    incomplete: dict[tuple[str, int, str], str] = {}
+    wrong: dict[tuple[str, int, str], str] = {}
     others = []
     for error in _errors(output):
         own = next((place for place in error.places if place[0] in lines), None)
+        said = _WORDS.search(error.text)
         if own is None:
             others.append(error)
-        else:
-            shown[(*own, error.text)] = None
-    words = [key for key in shown if _WORDS.search(key[2])]
-    keys = words or list(shown)  # what is incomplete explains all the rest
+        elif said:
+            incomplete[(*own, said[1])] = said[1]
+        else:  # once for both precisions
+            wrong.setdefault((*own, re.sub(r"\b(float|double)\b", "", error.text)), error.text)
     message = []
-    for file, line, text in keys:
+    for (file, line, _), text in (incomplete or wrong).items():  # the first explain the others
         source = lines[file][line - 1].strip() if line <= len(lines[file]) else ""
-        said = _WORDS.search(text)
-        message += [f"{Path(file).name}:{line}: {said[1] if said else text}", f"    {source}"]
-    if not keys:
+        message += [f"{Path(file).name}:{line}: {text}", f"    {source}"]
+    if not message:
         message = [f"{header.name} does not compile"]
         message += [f"{error.places[0][0]}: {error.text}" for error in others]
         if not others:
