@@ -405,6 +405,11 @@ def test_a_syntax_error(tmp_path, old, new, words):
     [
         ("int answer() { return 42; }", "no model found. A model is a struct like"),
         (
+            "struct Outer {\n"
+            "  template <class S> struct A : auvest::ProcessModel<A<S>, S, 2> {};\n};",
+            "no model found",
+        ),
+        (
             "struct Flat : auvest::ProcessModel<Flat, float, 2> {};",
             ":1: Flat must begin with template <class Scalar>",
         ),
@@ -415,7 +420,7 @@ def test_a_syntax_error(tmp_path, old, new, words):
             ":1: there are two models called A",
         ),
     ],
-    ids=["foreign", "no template", "twice"],
+    ids=["foreign", "inner", "no template", "twice"],
 )
 def test_a_header_without_models_for_us(tmp_path, text, words):
     header = tmp_path / "other.hpp"
