@@ -75,8 +75,7 @@ class AnySlat {
                  const VelocityChange* changes = nullptr) {
     return filter_->predict(dt, u, random, changes);
   }
-  Status update(const Echo* echoes, int count, const Sonar<Scalar>& sonar,
-                math::Random& random) {
+  Status update(const Echo* echoes, int count, const Sonar<Scalar>& sonar, math::Random& random) {
     return filter_->update(echoes, count, sonar, random);
   }
   Status step(Scalar dt, const Control& u, const VelocityChange* changes, const Echo* echoes,

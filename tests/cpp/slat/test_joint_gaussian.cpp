@@ -15,8 +15,8 @@
 namespace {
 
 using auvest::Belief;
-using auvest::kUnknownMaster;
 using auvest::Echo;
+using auvest::kUnknownMaster;
 using auvest::Vector;
 using Compass = auvest::CompassMotion<double>;
 using Unicycle = auvest::UnicycleMotion<double>;

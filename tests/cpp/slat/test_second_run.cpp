@@ -55,7 +55,7 @@ void run(Filter& filter, Random& random, int pings) {
   for (int k = 0; k < pings; ++k) {
     REQUIRE(filter.predict(1, Pair(2, 0.1f), random) == Status::kOk);
     const Echo<float> seen[2] = {echo_of(0, 180.0f + float(k), -2.16f),
-                                     echo_of(1, 250.0f - float(k), -0.65f)};
+                                 echo_of(1, 250.0f - float(k), -0.65f)};
     REQUIRE(filter.update(seen, 1 + k % 2, sonar, random) == Status::kOk);
   }
 }

@@ -512,7 +512,8 @@ TEST_CASE("SLATF 1.0: a particle whose correction overflows weighs nothing, the 
       lost = static_cast<int>(std::max_element(weights[0].begin(), weights[0].end()) -
                               weights[0].begin());
       *particles_of(filter).at(lost, Filter::kMasterField + 2) = std::numeric_limits<float>::max();
-      *particles_of(filter).at(lost, Filter::kMasterField + 3) = std::numeric_limits<float>::lowest();
+      *particles_of(filter).at(lost, Filter::kMasterField + 3) =
+          std::numeric_limits<float>::lowest();
       *particles_of(filter).at(lost, Filter::kMasterField + 6 + 3) = 1e36f;  // P(2, 0)
       *particles_of(filter).at(lost, Filter::kMasterField + 6 + 6) = 1e36f;  // P(3, 0)
     }

@@ -317,7 +317,7 @@ class Slatf : public SlatfFrame<SlatfParticle<Motion_, Master_, Proposal_, Maste
   bool births() const { return params_.birth_velocity_m_s > Scalar(0) && masters_ < Masters; }
 
   /// True if most of the weight finds echo s beyond the gate of every master.
-  bool is_unassociated(const Update& update, int s) {
+  AUVEST_OUTLINE bool is_unassociated(const Update& update, int s) {
     using math::select;
     OrderedSum<Lanes> beyond;
     Schedule::for_each_group(set_, [&](int i) {
@@ -335,7 +335,7 @@ class Slatf : public SlatfFrame<SlatfParticle<Motion_, Master_, Proposal_, Maste
   }
 
   /// A new master where each particle hears echo s come from.
-  void add_master(const Update& update, int s) {
+  AUVEST_OUTLINE void add_master(const Update& update, int s) {
     const Scalar velocity = params_.birth_velocity_m_s * params_.birth_velocity_m_s;
     const Scalar acceleration = params_.birth_acceleration_m_s2 * params_.birth_acceleration_m_s2;
     Schedule::for_each_group(set_, [&](int i) {

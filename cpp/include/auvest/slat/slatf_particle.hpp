@@ -277,7 +277,7 @@ struct SlatfParticle {
     Value (*chosen)[Masters];
 
     template <class Group>
-    void operator()(Group, int i, int g) const {
+    AUVEST_OUTLINE void operator()(Group, int i, int g) const {
       using math::select;
       const Single particle = {set, i};
       typename Single::Pose pose;
@@ -372,7 +372,7 @@ struct SlatfParticle {
     MasterEkf<Value>* ekfs;
 
     template <class Group>
-    void operator()(Group, int i, int g) const {
+    AUVEST_OUTLINE void operator()(Group, int i, int g) const {
       using math::select;
       const Single particle = {set, i};
       MasterEkf<Value>& ekf = ekfs[g];
