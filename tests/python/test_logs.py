@@ -118,8 +118,8 @@ def test_a_file_that_is_read_as_a_whole_must_be_small(
 ) -> None:
     monkeypatch.setattr(reader, "SMALL_FILE_LINES", 10)
     monkeypatch.setattr(reader, "CHUNK_LINES", lines)
-    path = write(tmp_path, "ranges.csv", HEAD + "1,0,5\n" * 8)
-    assert len(read(path)) == 8
+    path = write(tmp_path, "ranges.csv", HEAD + "1,0,5\n" * 9)
+    assert len(read(path)) == 9
     path = write(tmp_path, "ranges.csv", HEAD + "1,0,5\n" * 10)
     with pytest.raises(LogError, match=r"ranges\.csv: has more than 10 lines"):
         read(path)

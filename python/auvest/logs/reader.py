@@ -127,7 +127,7 @@ class CsvTable:
         """
         parts = []
         for rows, line in self.chunks():
-            if line + len(rows) > SMALL_FILE_LINES:
+            if line - 1 + len(rows) > SMALL_FILE_LINES:
                 raise LogError(self.path, f"has more than {SMALL_FILE_LINES} lines")
             parts.append(rows)
         return np.concatenate(parts) if parts else np.empty((0, len(self.columns)))
