@@ -166,9 +166,11 @@ def test_not_text_and_not_there(tmp_path: Path) -> None:
         read(path)
 
 
-def stream(folder: Path, times: list[float], *, late_s: float, required: bool = False) -> Stream:
+def stream(folder: Path, times: list[float], *, reorder_s: float, required: bool = False) -> Stream:
     text = HEAD + "".join(f"{time},{k},1\n" for k, time in enumerate(times))
-    return Stream(CsvTable(write(folder, "ranges.csv", text)), late_s=late_s, required=required)
+    return Stream(
+        CsvTable(write(folder, "ranges.csv", text)), reorder_s=reorder_s, required=required
+    )
 
 
 def merged(*streams: Stream) -> list[np.ndarray]:
@@ -190,7 +192,7 @@ def test_late_lines_are_put_in_order_within_the_window_and_counted_beyond(
 ) -> None:
     monkeypatch.setattr(reader, "CHUNK_LINES", lines)
     #        line    2  3  4    5  6  7    8
-    one = stream(tmp_path, [0, 3, 1.5, 4, 1, 3.5, 2], late_s=2.0)
+    one = stream(tmp_path, [0, 3, 1.5, 4, 1, 3.5, 2], reorder_s=2.0)
     (rows,) = merged(one)
     np.testing.assert_array_equal(rows[:, 0], [0, 1.5, 2, 3, 3.5, 4])
     np.testing.assert_array_equal(rows[:, 1], [0, 2, 6, 1, 5, 3])
@@ -198,14 +200,14 @@ def test_late_lines_are_put_in_order_within_the_window_and_counted_beyond(
 
 
 def test_a_shuffled_file_is_an_error_where_order_matters(tmp_path: Path) -> None:
-    shuffled = stream(tmp_path, [0, 5, 4, 6], late_s=0.5, required=True)
+    shuffled = stream(tmp_path, [0, 5, 4, 6], reorder_s=0.5, required=True)
     with pytest.raises(LogError, match=r"line 4.*1 s older.*window.*0\.5 s: shuffled"):
         merged(shuffled)
 
 
 def test_lines_of_one_time_keep_the_order_of_the_file(tmp_path: Path) -> None:
     """Many of them, late ones too: sources 0 to 99 at 4 s, recorded after a line of 5 s."""
-    one = stream(tmp_path, [0, 5] + [4] * 100 + [5, 5], late_s=2.0)
+    one = stream(tmp_path, [0, 5] + [4] * 100 + [5, 5], reorder_s=2.0)
     (rows,) = merged(one)
     assert rows[:, 0].tolist() == [0] + [4] * 100 + [5] * 3
     assert rows[:, 1].tolist() == [0, *range(2, 102), 1, 102, 103]
@@ -213,7 +215,7 @@ def test_lines_of_one_time_keep_the_order_of_the_file(tmp_path: Path) -> None:
 
 
 def test_the_window_for_late_lines_is_as_long_as_it_says(tmp_path: Path) -> None:
-    one = stream(tmp_path, [0, 10, 8, 7.999], late_s=2.0)
+    one = stream(tmp_path, [0, 10, 8, 7.999], reorder_s=2.0)
     (rows,) = merged(one)
     assert rows[:, 0].tolist() == [0, 8, 10]
     assert (one.late.reordered, one.late.dropped, one.late.lines) == (1, 1, [5])
@@ -225,7 +227,7 @@ def test_the_first_lines_that_came_too_late_are_named(
 ) -> None:
     """Every other of 18 lines, from line 3 on: nine are dropped, five are named."""
     monkeypatch.setattr(reader, "CHUNK_LINES", lines)
-    one = stream(tmp_path, [t for k in range(9) for t in (10 + k, k)], late_s=0.0)
+    one = stream(tmp_path, [t for k in range(9) for t in (10 + k, k)], reorder_s=0.0)
     (rows,) = merged(one)
     assert rows[:, 0].tolist() == list(range(10, 19))
     assert (one.late.dropped, one.late.lines) == (9, [3, 5, 7, 9, 11])
@@ -236,9 +238,9 @@ def test_files_of_different_rate_come_together(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lines: int
 ) -> None:
     monkeypatch.setattr(reader, "CHUNK_LINES", lines)
-    fast = stream(tmp_path / "fast", [0.1 * k for k in range(200)], late_s=0.0)
-    slow = stream(tmp_path / "slow", [0.0, 9.0, 9.0, 19.0, 50.0], late_s=0.0)
-    empty = stream(tmp_path / "empty", [], late_s=0.0)
+    fast = stream(tmp_path / "fast", [0.1 * k for k in range(200)], reorder_s=0.0)
+    slow = stream(tmp_path / "slow", [0.0, 9.0, 9.0, 19.0, 50.0], reorder_s=0.0)
+    empty = stream(tmp_path / "empty", [], reorder_s=0.0)
     rows = merged(fast, slow, empty)
     assert [len(part) for part in rows] == [200, 5, 0]
 

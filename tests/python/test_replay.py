@@ -156,7 +156,7 @@ def test_increments_and_ranges_are_those_of_the_filter_step_by_step(tmp_path: Pa
 def test_no_result_depends_on_the_chunks(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str, lines: int
 ) -> None:
-    settings = settings_from({"log": {"late_s": 0.7, "leader_gap_s": 3.0}})
+    settings = settings_from({"log": {"reorder_s": 0.7, "leader_gap_s": 3.0}})
     {"increments": increments_log, "velocities": velocity_log, "fixes": fixes_log}[kind](tmp_path)
     name = "ukf" if kind == "fixes" else "robust-ekf"
     whole = run(tmp_path, settings, name)
@@ -553,7 +553,7 @@ def test_late_ranges_give_the_same_as_ranges_in_time(tmp_path: Path) -> None:
     shuffled = rows[[1, 0, 2, 5, 3, 4, *range(6, len(rows))]]
     write_file(tmp_path / "late", "ranges.csv", time_s=shuffled[:, 0],
                source=shuffled[:, 1].astype(int), range_m=shuffled[:, 2])  # fmt: skip
-    window = replace(SETTINGS, log=replace(SETTINGS.log, late_s=2.0))
+    window = replace(SETTINGS, log=replace(SETTINGS.log, reorder_s=2.0))
     in_time, late = run(tmp_path / "in_time", SETTINGS), run(tmp_path / "late", window)
     np.testing.assert_array_equal(in_time["estimates"]["x_m"], late["estimates"]["x_m"])
     assert late["late"]["ranges.csv"].reordered == 3
@@ -866,8 +866,8 @@ def test_packaged_settings_have_one_kernel(name: str) -> None:
         ("[range]\nsigma_m = 1.0", r"has no 'range'; known are filter, start"),
         ("[ranges]\nsigma_m = 0.0", r"\[ranges\] sigma_m must be positive"),
         ("[ranges]\nsigma_m = '1'", r"\[ranges\] sigma_m must be a number, not str"),
-        ("[log]\nlate_s = -1", r"\[log\] late_s must not be negative"),
-        ("[log]\nlate_s = inf", r"\[log\] late_s must be finite"),
+        ("[log]\nreorder_s = -1", r"\[log\] reorder_s must not be negative"),
+        ("[log]\nreorder_s = inf", r"\[log\] reorder_s must be finite"),
         ("[filter]\nkind = 'kf'", r"\[filter\] kind must be one of 'ekf', 'ukf'"),
         ("[filter]\nkernel = 'cauchy'", r"\[filter\] kernel must be one of 'huber'"),
         ("ranges = 3", r"\[ranges\] must be a section"),

@@ -45,18 +45,18 @@ class Stream:
     ----------
     table : CsvTable
         The file; its first column is the time.
-    late_s : float
+    reorder_s : float
         How late a line may be, s.
     required : bool
         True: a line that is later than that is an error, because nothing after it would be right.
         False: it is counted.
     """
 
-    def __init__(self, table: CsvTable, *, late_s: float, required: bool) -> None:
+    def __init__(self, table: CsvTable, *, reorder_s: float, required: bool) -> None:
         self.table = table
         self.late = Late()
         self.horizon = -math.inf  # all rows before this time are known
-        self._late_s = late_s
+        self._reorder_s = reorder_s
         self._required = required
         self._chunks = table.chunks()
         self._newest = -math.inf
@@ -72,13 +72,13 @@ class Stream:
         time = rows[:, 0]
         newest = np.maximum.accumulate(np.concatenate([[self._newest], time]))
         behind = newest[:-1] - time
-        dropped = behind > self._late_s
+        dropped = behind > self._reorder_s
         if dropped.any():
             self._note(rows, behind, dropped, first)
             rows, behind = rows[~dropped], behind[~dropped]
         self.late.reordered += int((behind > 0).sum())
         self._newest = float(newest[-1])
-        self.horizon = self._newest - self._late_s
+        self.horizon = self._newest - self._reorder_s
         waiting = np.concatenate([self._waiting, rows])
         self._waiting = waiting[np.argsort(waiting[:, 0], kind="stable")]
 
@@ -95,7 +95,7 @@ class Stream:
             raise LogError(
                 self.table.path,
                 f"{rows[i, 0]:.10g} is {behind[i]:.3g} s older than a line before it, and the "
-                f"window for late lines is {self._late_s:g} s: shuffled?",
+                f"window for late lines is {self._reorder_s:g} s: shuffled?",
                 line=lines[0],
                 column="time_s",
             )

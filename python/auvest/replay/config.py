@@ -99,7 +99,7 @@ class IntervalSettings:
 class LogSettings:
     """Window for late lines, and the longest gap in a leader's track that a line bridges."""
 
-    late_s: float = _number(0.0)
+    reorder_s: float = _number(0.0)
     leader_gap_s: float = _number(1.0)
 
 

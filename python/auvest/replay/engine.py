@@ -65,10 +65,12 @@ class Replay(ABC):
         self.log = log
         self.settings = settings
         self.filter_name = filter_name
-        late_s = settings.log.late_s
+        reorder_s = settings.log.reorder_s
         names = [self._measured, "odometry.csv", "leaders.csv", "truth.csv"]
         self.streams = {
-            name: Stream(log[name], late_s=late_s, required=name in ("odometry.csv", "leaders.csv"))
+            name: Stream(
+                log[name], reorder_s=reorder_s, required=name in ("odometry.csv", "leaders.csv")
+            )
             for name in names
             if name in log
         }

@@ -76,7 +76,7 @@ def warnings(result: Result) -> list[str]:
             more = " ..." if late["dropped"] > len(late["lines"]) else ""
             found.append(
                 f"{name}: {late['dropped']} not used, later than the window of "
-                f"{result.settings.log.late_s:g} s allows (line {lines}{more})."
+                f"{result.settings.log.reorder_s:g} s allows (line {lines}{more})."
             )
     reasons = {
         tables.BEFORE_START: "taken before the start of the run",
