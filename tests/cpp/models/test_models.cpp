@@ -689,7 +689,7 @@ void check_deviations_in_space() {
   // chain of about twenty operations; long double itself leaves 1e-18.
   const auto model = usbl<Scalar>(0, 0, 0);
   const long double pi = 3.14159265358979323846L;
-  const double ulp = std::numeric_limits<Scalar>::epsilon();
+  const double ulp = double(std::numeric_limits<Scalar>::epsilon());
   Random random(13);
   for (int trial = 0; trial < 3000; ++trial) {
     const double size = std::pow(10.0, 1 - trial % 6);
@@ -717,8 +717,10 @@ void check_deviations_in_space() {
     const double range = double(centre(0));
     const double unit[3] = {range * std::fmax(u, 1.0), 1, 1};  // lengths grow with e, angles do not
     for (int i = 0; i < 3; ++i) {
-      CHECK(std::fabs(double(sum(i) - (plus(i) + minus(i)))) < (second + 1e-18) * unit[i]);
-      CHECK(std::fabs(double(difference(i) - (plus(i) - minus(i)))) < (first + 1e-18) * unit[i]);
+      const auto sum_error = static_cast<long double>(sum(i)) - (plus(i) + minus(i));
+      const auto difference_error = static_cast<long double>(difference(i)) - (plus(i) - minus(i));
+      CHECK(std::fabs(double(sum_error)) < (second + 1e-18) * unit[i]);
+      CHECK(std::fabs(double(difference_error)) < (first + 1e-18) * unit[i]);
     }
   }
 }
