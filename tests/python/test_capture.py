@@ -255,8 +255,8 @@ class PortWithBoard:
         self.answers.append(received.decode().strip())
 
     def unplug(self) -> None:
-        os.close(self.master)
-        self.master = -1
+        master, self.master = self.master, -1  # first: the other end acts at once
+        os.close(master)
 
 
 @pytest.fixture
