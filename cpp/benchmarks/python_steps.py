@@ -43,15 +43,14 @@ SIGMA_UKF = (0.05, 0.01)
 ALPHA, BETA, KAPPA = 0.1, 2.0, -3.0
 
 
-def auvest_range_filter() -> tuple[Any, list[Any]]:
-    """Make auvest's filter of two states, and the sensor of each leader."""
+def auvest_range_filter() -> tuple[Any, list[str]]:
+    """Make auvest's filter of two states, and the names of its sensors, one of each leader."""
     process = auvest.SpeedHeading(sigma_forward=SIGMA_SPEED, sigma_heading=SIGMA_HEADING)
-    sensors = [
-        auvest.LeaderRange(leader=(float(x), float(y)), sigma_range_m=SIGMA_RANGE)
-        for x, y in LEADERS
-    ]
-    ekf = auvest.Ekf(START, START_P, process=process)
-    return ekf, sensors
+    sensors = {
+        f"leader {k}": auvest.LeaderRange(leader=(float(x), float(y)), sigma_range_m=SIGMA_RANGE)
+        for k, (x, y) in enumerate(LEADERS)
+    }
+    return auvest.Ekf(START, START_P, process=process, sensors=sensors), list(sensors)
 
 
 def auvest_six_states() -> Any:
