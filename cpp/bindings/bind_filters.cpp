@@ -8,6 +8,7 @@
 
 #include "desk/function_models.hpp"
 #include "handles.hpp"
+#include "plain.hpp"
 
 namespace auvest {
 namespace bindings {
@@ -20,70 +21,29 @@ using desk::kMaxSize;
 /// Answers of single steps; from 0 on they are a Status.
 const int kUnclear = -1;
 
-/// A number that Python has as a float or an int; false for anything else, and for what `Scalar`
-/// cannot hold.
-template <class Scalar>
-bool read_number(PyObject* object, Scalar& value) {
-  double given;
-  if (PyFloat_Check(object)) {
-    given = PyFloat_AS_DOUBLE(object);
-  } else if (PyLong_CheckExact(object)) {
-    given = PyLong_AsDouble(object);
-    if (PyErr_Occurred() != nullptr) {
-      PyErr_Clear();
-      return false;
-    }
-  } else {
-    return false;
-  }
-  value = static_cast<Scalar>(given);
-  return std::isfinite(value) || std::isnan(given);
-}
-
-template <class Scalar, class Element>
-bool read_elements(const py::array& array, Scalar* values, int size) {
+/// Exactly `size` plain numbers, or one that stands for itself; NaN may be among them.
+template <class Scalar, int Most>
+bool take_row(py::handle given, Scalar (&row)[Most], int size) {
+  double numbers[Most];
+  const bool single = size == 1 && plain::take_any(given, numbers[0]);
+  if (!single && !plain::take_any(given, size, numbers)) return false;
   for (int i = 0; i < size; ++i) {
-    const Element given = *static_cast<const Element*>(array.data(i));
-    values[i] = static_cast<Scalar>(given);
-    if (!std::isfinite(values[i]) && !std::isnan(given)) return false;
+    row[i] = std::numeric_limits<Scalar>::quiet_NaN();
+    if (!std::isnan(numbers[i]) && !plain::narrow(numbers[i], row[i])) return false;
   }
   return true;
-}
-
-/// Exactly `size` numbers: a list, a tuple or an array of floats; one number may stand for itself.
-template <class Scalar>
-bool read_numbers(const py::handle& object, Scalar* values, int size) {
-  PyObject* const given = object.ptr();
-  if (size == 1 && read_number(given, values[0])) return true;
-  if (PyList_CheckExact(given) || PyTuple_CheckExact(given)) {
-    if (PySequence_Fast_GET_SIZE(given) != size) return false;
-    for (int i = 0; i < size; ++i) {
-      if (!read_number(PySequence_Fast_GET_ITEM(given, i), values[i])) return false;
-    }
-    return true;
-  }
-  // Exactly an array: a masked one would hide what its mask says.
-  if (Py_TYPE(given) != py::detail::npy_api::get().PyArray_Type_) return false;
-  const auto array = py::reinterpret_borrow<py::array>(object);
-  if (array.ndim() != 1 || array.shape(0) != size) return false;
-  const char kind = array.dtype().kind();
-  const auto width = array.itemsize();
-  if (kind != 'f' || array.dtype().byteorder() == '>') return false;
-  if (width == 8) return read_elements<Scalar, double>(array, values, size);
-  if (width == 4) return read_elements<Scalar, float>(array, values, size);
-  return false;
 }
 
 template <class Scalar>
 int predict(FilterHandle<Scalar>& handle, const py::object& dt, const py::object& input) {
   const Occupied<Scalar> occupied(handle);
   Scalar step = std::numeric_limits<Scalar>::quiet_NaN();  // the filter's own interval
-  if (!dt.is_none() && (!read_number(dt.ptr(), step) || !(step >= Scalar(0)))) return kUnclear;
+  if (!dt.is_none() && (!plain::take(dt, step) || !(step >= Scalar(0)))) return kUnclear;
   Scalar values[kMaxInputs];
   const int inputs = handle.filter->inputs();
   if (input.is_none() != (inputs == 0)) return kUnclear;
   if (inputs > 0) {
-    if (!read_numbers(input, values, inputs)) return kUnclear;
+    if (!take_row(input, values, inputs)) return kUnclear;
     for (int i = 0; i < inputs; ++i) {
       if (std::isnan(values[i])) return kUnclear;
     }
@@ -102,19 +62,19 @@ int update(FilterHandle<Scalar>& handle, const py::object& z, const SensorHandle
   Scalar elapsed = Scalar(0);
   bool missing = z.is_none();
   if (!missing) {
-    if (!read_numbers(z, values, sensor->size)) return kUnclear;
+    if (!take_row(z, values, sensor->size)) return kUnclear;
     int gone = 0;
     for (int i = 0; i < sensor->size; ++i) gone += std::isnan(values[i]) ? 1 : 0;
     if (gone > 0 && gone < sensor->size) return kUnclear;
     missing = gone > 0;
   }
   if (!place.is_none()) {
-    if (sensor->place == 0 || !read_numbers(place, there, sensor->place)) return kUnclear;
+    if (sensor->place == 0 || !take_row(place, there, sensor->place)) return kUnclear;
     for (int i = 0; i < sensor->place; ++i) {
       if (std::isnan(there[i])) return kUnclear;
     }
   }
-  if (!age.is_none() && (!read_number(age.ptr(), elapsed) || !(elapsed >= Scalar(0)))) {
+  if (!age.is_none() && (!plain::take(age, elapsed) || !(elapsed >= Scalar(0)))) {
     return kUnclear;
   }
   if (missing) {
@@ -134,7 +94,7 @@ int feedback(FilterHandle<Scalar>& handle, const py::object& reference) {
   const Occupied<Scalar> occupied(handle);
   Scalar desired[2];
   if (!reference.is_none()) {
-    if (!read_numbers(reference, desired, 2)) return kUnclear;
+    if (!take_row(reference, desired, 2)) return kUnclear;
     if (std::isnan(desired[0]) || std::isnan(desired[1])) return kUnclear;
   }
   handle.status = handle.filter->feedback(reference.is_none() ? nullptr : desired);

@@ -1,6 +1,6 @@
 // Arguments as users give them, taken without a detour through NumPy where they are plain: Python's
-// numbers, lists and tuples of them, C-contiguous arrays of float32, float64 or int64 of the very
-// shape, all within the range of the filter's precision.
+// numbers, lists and tuples of them, arrays of float32, float64 or int64 of the very shape (of
+// several axes: C-contiguous), all within the range of the filter's precision.
 //
 // What is not plain (another type, another shape, a number that is not finite) is left to the
 // Python layer, which converts it, or says what is wrong with it.
@@ -37,13 +37,15 @@ inline bool take_any(py::handle value, double& number) {
 
 template <class Element>
 bool take_elements(py::handle value, py::ssize_t count, double* numbers) {
-  if (!py::isinstance<Array<Element>>(value)) return false;
+  if (!py::isinstance<py::array_t<Element, 0>>(value)) return false;
   const auto array = py::reinterpret_borrow<py::array>(value);
   if (array.size() != count) return false;
+  if (array.ndim() != 1 && !py::isinstance<Array<Element>>(value)) return false;
+  const py::ssize_t step = array.ndim() == 1 ? array.strides(0) : py::ssize_t(sizeof(Element));
   const char* from = static_cast<const char*>(array.data());
   for (py::ssize_t i = 0; i < count; ++i) {
     Element element;  // need not be aligned there
-    std::memcpy(&element, from + i * py::ssize_t(sizeof(Element)), sizeof(Element));
+    std::memcpy(&element, from + i * step, sizeof(Element));
     numbers[i] = static_cast<double>(element);
   }
   return true;
