@@ -2,14 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-import numpy.typing as npt
-
 from auvest.filters._base import GaussianFilter
-from auvest.kernels import Kernel, KernelName, RejectionStreak
-
-_STREAK = RejectionStreak()
+from auvest.filters._robust import RobustByDefault
 
 
 class Ekf(GaussianFilter):
@@ -57,7 +51,7 @@ class Ekf(GaussianFilter):
     _jacobians = True
 
 
-class RobustEkf(Ekf):
+class RobustEkf(RobustByDefault, Ekf):
     """M-estimation EKF (Li, Du, Fan, Chen, Mao, Luo 2020): an :class:`Ekf` with a robust kernel.
 
     Parameters
@@ -74,14 +68,3 @@ class RobustEkf(Ekf):
     ValueError, TypeError
         If an argument is wrong; the message names it.
     """
-
-    def __init__(
-        self,
-        x0: npt.ArrayLike,
-        P0: npt.ArrayLike,
-        *,
-        kernel: Kernel | KernelName = "hampel",
-        recovery: RejectionStreak | None = _STREAK,
-        **options: Any,
-    ) -> None:
-        super().__init__(x0, P0, kernel=kernel, recovery=recovery, **options)

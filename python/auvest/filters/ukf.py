@@ -9,12 +9,11 @@ import numpy.typing as npt
 from auvest import _core
 from auvest._arguments import as_instance, as_points
 from auvest.filters._base import GaussianFilter, Sensors
+from auvest.filters._robust import RobustByDefault
 from auvest.intervals import IntervalPolicy, MahalanobisInterval
-from auvest.kernels import Kernel, KernelName, RejectionStreak
 from auvest.models import ConstantAcceleration, ProcessModel, RangeBearing
 
 _POINTS = _core.sigma_points_defaults()
-_STREAK = RejectionStreak()
 _PROCESS = ConstantAcceleration()
 _SENSOR = RangeBearing()
 _LAW = MahalanobisInterval()
@@ -75,7 +74,7 @@ class Ukf(GaussianFilter):
         return self._parameters["kappa"]
 
 
-class RobustUkf(Ukf):
+class RobustUkf(RobustByDefault, Ukf):
     """A :class:`Ukf` with a robust kernel; see :class:`auvest.RobustEkf`.
 
     Parameters
@@ -93,17 +92,6 @@ class RobustUkf(Ukf):
     ValueError, TypeError
         If an argument is wrong; the message names it.
     """
-
-    def __init__(
-        self,
-        x0: npt.ArrayLike,
-        P0: npt.ArrayLike,
-        *,
-        kernel: Kernel | KernelName = "hampel",
-        recovery: RejectionStreak | None = _STREAK,
-        **options: Any,
-    ) -> None:
-        super().__init__(x0, P0, kernel=kernel, recovery=recovery, **options)
 
 
 class Aukf(Ukf):
