@@ -1,15 +1,22 @@
-// Replays a record of an outage through SLATF 1.0 or 2.0 and writes the trace: the other program
+// Replays a record of an outage through a filter of slat/ and writes the trace: the other program
 // that `main` may be built around (see replay.hpp), with the same streams.
 //
-//     record: kind, particles, readings, seed, motion, q, filter, sonar,
-//             slave x and P, master x and P,
-//             then per reading of the odometry: dt, speed, heading, the master's velocity change,
-//             whether an echo followed, range, bearing
-//     trace:  statuses of reset and add_master, then per echo: all numbers of all particles,
-//             slave x and P, master x and P, N_eff, log likelihood, resamplings, status
+//     record: kind, particles, masters that there is room for, masters told, readings, seed,
+//             whether there is a plan,
+//             resampling, carried covariance, gate, births (2), kept, sonar (3),
+//             motion (3, or 2 of a unicycle), q, or the numbers of an Imm (13),
+//             slave x and P, each told master's x and P,
+//             then per reading of the odometry: dt, the reading (2), the velocity change of each
+//             master that there is room for, the number of echoes, and of each: seconds since the
+//             reading began, range, bearing, master
+//     trace:  statuses of reset and of each add_master, then per reading with echoes: all numbers
+//             of all particles, slave x and P, each master's x, P and, of an Imm, probabilities of
+//             its models, log likelihood with what else the filter tells, status
 //
-// AUVEST_PARTICLES is the capacity; AUVEST_LANES, if defined, names the architecture of xsimd in
-// whose lanes the particles run.
+// Masters that are not there are zeros. AUVEST_PARTICLES and AUVEST_MASTERS are the capacity;
+// AUVEST_KINDS, if defined, the kinds that this program has (bit k: kind k), where they do not fit
+// together; AUVEST_LANES, if defined, the architecture of xsimd in whose lanes Slatf's particles
+// run.
 #pragma once
 
 #if defined(AUVEST_LANES)
@@ -17,9 +24,16 @@
 #endif
 
 #include "auvest/math/bits.hpp"
+#include "auvest/models/constant_acceleration.hpp"
+#include "auvest/models/constant_velocity.hpp"
+#include "auvest/models/coordinated_turn.hpp"
 #include "auvest/models/piecewise_acceleration.hpp"
 #include "auvest/models/slave_motion.hpp"
+#include "auvest/records/run.hpp"
+#include "auvest/slat/ekf_slat.hpp"
+#include "auvest/slat/imm_slat.hpp"
 #include "auvest/slat/slatf.hpp"
+#include "auvest/slat/slatf_joint.hpp"
 
 namespace auvest {
 namespace parity {
@@ -30,7 +44,28 @@ using Lanes = SimdLanes<xsimd::AUVEST_LANES>;
 using Lanes = OneLane<float>;
 #endif
 
-enum Kind : std::uint32_t { kSlatf1, kSlatf2 };
+#if !defined(AUVEST_KINDS)
+#define AUVEST_KINDS 0xfffu
+#endif
+
+/// The filter, its motion unless that is CompassMotion, and its master where that is an Imm.
+enum Kind : std::uint32_t {
+  kSlatf1,
+  kSlatf2,
+  kSlatf1Unicycle,
+  kSlatf2Unicycle,
+  kSlatfJoint,
+  kSlatfJointUnicycle,
+  kEkfSlat,
+  kEkfSlatUnicycle,
+  kSlatf1Imm,
+  kSlatf2UnicycleImm,
+  kEkfSlatImm,
+  kEkfSlatUnicycleImm
+};
+
+template <bool>
+struct Included {};
 
 template <class Stream>
 class Replay {
@@ -38,87 +73,231 @@ class Replay {
   explicit Replay(Stream& stream) : stream_(stream) {}
 
   void run() {
-    const std::uint32_t kind = stream_.read();
+    kind_ = stream_.read();
     particles_ = static_cast<int>(stream_.read());
-    readings_ = stream_.read();
+    room_ = static_cast<int>(stream_.read());
+    told_ = static_cast<int>(stream_.read());
+    rows_.readings = stream_.read();
+    rows_.room = room_;
     random_ = math::Random(stream_.read());
-    motion_.params.sigma_speed_m_s = read();
-    motion_.params.sigma_heading_rad = read();
-    motion_.params.compensate_bias = stream_.read() != 0;
-    master_.params.acceleration_m_s2 = read();
-    params_.resample_below = read();
-    params_.gate = read();
+    rows_.planned = stream_.read() != 0;
+    resample_below_ = read();
+    carry_covariance_ = stream_.read() != 0;
+    gate_ = read();
+    birth_velocity_m_s_ = read();
+    birth_acceleration_m_s2_ = read();
+    kept_ = read();
     sonar_.params.sigma_range_m = read();
     sonar_.params.sigma_bearing_rad = read();
-    if (kind == kSlatf1) replay<Slatf1<Motion, Master, 1, SystematicResampling, Lanes>>();
-    if (kind == kSlatf2) replay<Slatf2<Motion, Master, 1, SystematicResampling, Lanes>>();
+    sonar_.params.bearing = static_cast<Bearing>(stream_.read());
+    particles<kSlatf1, First<Compass, OneModel>>();
+    particles<kSlatf2, Second<Compass, OneModel>>();
+    particles<kSlatf1Unicycle, First<Unicycle, OneModel>>();
+    particles<kSlatf2Unicycle, Second<Unicycle, OneModel>>();
+    particles<kSlatfJoint, SlatfJoint<Compass, OneModel, kMasters>>();
+    particles<kSlatfJointUnicycle, SlatfJoint<Unicycle, OneModel, kMasters>>();
+    gaussian<kEkfSlat, EkfSlat<Compass, OneModel, kMasters>>();
+    gaussian<kEkfSlatUnicycle, EkfSlat<Unicycle, OneModel, kMasters>>();
+    particles<kSlatf1Imm, First<Compass, ThreeModels>>();
+    particles<kSlatf2UnicycleImm, Second<Unicycle, ThreeModels>>();
+    gaussian<kEkfSlatImm, EkfSlat<Compass, ThreeModels, kMasters>>();
+    gaussian<kEkfSlatUnicycleImm, EkfSlat<Unicycle, ThreeModels, 1>>();
   }
 
  private:
-  using Motion = CompassMotion<float>;
-  using Master = PiecewiseAcceleration<float>;
+  static constexpr int kMasters = AUVEST_MASTERS;
+  using Compass = CompassMotion<float>;
+  using Unicycle = UnicycleMotion<float>;
+  using OneModel = PiecewiseAcceleration<float>;
+  using ThreeModels =
+      Imm<ConstantVelocity<float>, ExactAcceleration<float>, CoordinatedTurn<float>>;
+  // Every reading has a clock of its own, so floats will do.
+  using Row = SlatRow<float, kMasters, float>;
 
-  /// One storage for both kinds: 2.0 has more numbers per particle.
-  static float* storage() {
-    static Slatf2<Motion, Master, 1>::Storage<AUVEST_PARTICLES> particles;
-    return particles.numbers;
+  template <class Motion, class Master>
+  using First = Slatf1<Motion, Master, kMasters, SystematicResampling, Lanes>;
+  template <class Motion, class Master>
+  using Second = Slatf2<Motion, Master, kMasters, SystematicResampling, Lanes>;
+
+  template <Kind kind>
+  using IsIncluded = Included<(AUVEST_KINDS >> kind & 1u) != 0>;
+
+  template <Kind kind, class Filter>
+  void particles() {
+    if (kind_ == kind) particles<Filter>(IsIncluded<kind>());
   }
+  template <class Filter>
+  void particles(Included<false>) {}
+  template <Kind kind, class Filter>
+  void gaussian() {
+    if (kind_ == kind) gaussian<Filter>(IsIncluded<kind>());
+  }
+  template <class Filter>
+  void gaussian(Included<false>) {}
 
   // Frames of their own: on the chip none of these may lie below another.
+
   template <class Filter>
-  AUVEST_OUTLINE void start(Filter& filter) {
-    typename Filter::SlaveBelief slave;
-    read(slave);
-    stream_.write(static_cast<std::uint32_t>(filter.reset(slave, particles_, random_)));
-    typename Filter::MasterBelief master;
+  AUVEST_OUTLINE void particles(Included<true>) {
+    typename Filter::template Storage<AUVEST_PARTICLES> storage;
+    typename Filter::Motion motion;
+    typename Filter::Master master;
+    typename Filter::Params params;
+    read(motion);
     read(master);
-    stream_.write(static_cast<std::uint32_t>(filter.add_master(master)));
+    fill(params);
+    Filter filter(motion, master, params, storage);
+    start(filter, [this](Filter& f, const typename Filter::SlaveBelief& slave) {
+      return f.reset(slave, particles_, random_);
+    });
+    follow(filter);
   }
 
   template <class Filter>
-  AUVEST_OUTLINE void replay() {
-    Filter filter(motion_, master_, params_, storage(), AUVEST_PARTICLES);
-    start(filter);
-    for (std::uint32_t k = 0; k < readings_; ++k) {
-      if (step(filter)) show(filter);
+  AUVEST_OUTLINE void gaussian(Included<true>) {
+    typename Filter::Motion motion;
+    typename Filter::Master master;
+    typename Filter::Params params;
+    read(motion);
+    read(master);
+    params.gate = gate_;
+    Filter filter(motion, master, params);
+    start(filter, [this](Filter& f, const typename Filter::SlaveBelief& slave) {
+      return f.reset(slave, random_);
+    });
+    follow(filter);
+  }
+
+  template <class Filter, class Reset>
+  AUVEST_OUTLINE void start(Filter& filter, const Reset& reset) {
+    typename Filter::SlaveBelief slave;
+    read(slave);
+    write(reset(filter, slave));
+    for (int n = 0; n < told_; ++n) {
+      typename Filter::MasterBelief master;
+      read(master);
+      write(filter.add_master(master));
     }
   }
 
-  /// Takes in a reading, and the echo if one followed: then it is true.
   template <class Filter>
-  AUVEST_OUTLINE bool step(Filter& filter) {
-    const float dt = read();
-    typename Filter::Control u;
-    typename Filter::VelocityChange change;
-    Echo<float> echo;
-    read(u);
-    read(change);
-    const bool heard = stream_.read() != 0;
-    read(echo.z);
-    echo.master = 0;
-    note(filter.predict(dt, u, random_, &change));
-    if (heard) note(filter.update(&echo, 1, sonar_, random_));
-    return heard;
+  void follow(Filter& filter) {
+    run_record<Row>(filter, rows_, sonar_, random_, [&](const Row& row, Status status) {
+      if (row.count > 0) show(filter);
+      if (row.count > 0 || status != Status::kOk) write(status);
+    });
   }
 
-  /// Of several statuses the first that is not kOk is told.
-  void note(Status status) {
-    if (status_ == Status::kOk) status_ = status;
+  void fill(SlatfParams<float>& params) const {
+    params.resample_below = resample_below_;
+    params.carry_covariance = carry_covariance_;
+    params.gate = gate_;
+    params.birth_velocity_m_s = birth_velocity_m_s_;
+    params.birth_acceleration_m_s2 = birth_acceleration_m_s2_;
   }
+  void fill(SlatfJointParams<float>& params) const {
+    params.resample_below = resample_below_;
+    params.kept = kept_;
+    params.gate = gate_;
+  }
+
+  // ---- The trace -------------------------------------------------------------------------------
 
   template <class Filter>
   AUVEST_OUTLINE void show(const Filter& filter) {
-    for (int i = 0; i < filter.particles(); ++i) {
-      write(filter.set().log_weights()[i]);
-      for (int field = 0; field < Filter::Set::kFields; ++field) write(*filter.set().at(i, field));
-    }
+    show_particles(filter);
     write(filter.slave());
-    write(filter.master(0));
+    for (int n = 0; n < room_; ++n) show_master(filter, n);
+    show_readings(filter);
+  }
+
+  template <class Motion, int Masters, class Set, class Resampling>
+  void show_readings(const ParticleSlatFilter<Motion, Masters, Set, Resampling>& filter) {
     write(filter.effective_size());
     write(filter.log_likelihood());
     stream_.write(static_cast<std::uint32_t>(filter.resamplings()));
-    stream_.write(static_cast<std::uint32_t>(status_));
   }
+  template <class Motion, class Master, int Masters>
+  void show_readings(const EkfSlat<Motion, Master, Masters>& filter) {
+    write(filter.nis());
+    write(filter.log_likelihood());
+  }
+
+  template <class Filter>
+  AUVEST_OUTLINE void show_master(const Filter& filter, int n) {
+    typename Filter::MasterBelief master;
+    math::set_zero(master.x);
+    math::set_zero(master.P);
+    if (n < filter.masters()) master = filter.master(n);
+    write(master);
+    show_modes(filter, n, static_cast<const typename Filter::Master*>(nullptr));
+  }
+
+  template <class Filter>
+  void show_modes(const Filter&, int, const OneModel*) {}
+  template <class Filter>
+  void show_modes(const Filter& filter, int n, const ThreeModels*) {
+    for (int k = 0; k < ThreeModels::kModes; ++k) {
+      write(n < filter.masters() ? filter.mode_probability(n, k) : 0.0f);
+    }
+  }
+
+  template <class Motion, class Master, int Masters>
+  void show_particles(const EkfSlat<Motion, Master, Masters>&) {}
+  template <class Motion, class Master, class Proposal, int Masters, class Resampling, class L>
+  void show_particles(const Slatf<Motion, Master, Proposal, Masters, Resampling, L>& filter) {
+    for (int i = 0; i < filter.particles(); ++i) show_particle(filter, i);
+  }
+  template <class Motion, class Master, int Masters, class Resampling>
+  void show_particles(const SlatfJoint<Motion, Master, Masters, Resampling>& filter) {
+    using Fields = SlatfJointFields<Motion::kStates, Masters>;
+    for (int i = 0; i < filter.particles(); ++i) {
+      show_particle(filter, i);
+      int cross = 0;  // numbers of the masters that there is room for
+      for (int n = 0; n < room_; ++n) cross += 6 * (Motion::kStates + 6 * n);
+      for (int k = 0; k < cross; ++k) write(*filter.set().at(i, Fields::kCrossField + k));
+    }
+  }
+
+  /// Weight, pose and masters.
+  template <class Filter>
+  void show_particle(const Filter& filter, int i) {
+    write(filter.set().log_weights()[i]);
+    const int there = Filter::kMasterField + filter.masters() * Filter::kMasterNumbers;
+    for (int field = 0; field < Filter::kMasterField + room_ * Filter::kMasterNumbers; ++field) {
+      write(field < there ? *filter.set().at(i, field) : 0.0f);
+    }
+  }
+
+  // ---- Words -----------------------------------------------------------------------------------
+
+  /// The readings that are left, from the stream.
+  struct Rows {
+    Replay& replay;
+    std::uint32_t readings;
+    int room;
+    bool planned;
+    TimedEcho<float, float> echoes[kMasters];
+
+    AUVEST_OUTLINE bool next(Row& row) {
+      if (readings == 0) return false;
+      --readings;
+      row.from_s = 0.0f;
+      row.to_s = replay.read();
+      replay.read(row.u);
+      row.planned = planned;
+      for (Vector<float, 2>& change : row.changes) math::set_zero(change);
+      for (int n = 0; n < room; ++n) replay.read(row.changes[n]);
+      row.echoes = echoes;
+      row.count = static_cast<int>(replay.stream_.read());
+      for (int s = 0; s < row.count; ++s) {
+        echoes[s].time_s = replay.read();
+        replay.read(echoes[s].echo.z);
+        echoes[s].echo.master = static_cast<int>(static_cast<std::int32_t>(replay.stream_.read()));
+      }
+      return true;
+    }
+  };
 
   float read() { return math::from_bits(stream_.read()); }
 
@@ -135,6 +314,39 @@ class Replay {
     }
   }
 
+  void read(Compass& motion) {
+    motion.params.sigma_speed_m_s = read();
+    motion.params.sigma_heading_rad = read();
+    motion.params.compensate_bias = stream_.read() != 0;
+  }
+
+  void read(Unicycle& motion) {
+    motion.params.sigma_speed_m_s = read();
+    motion.params.sigma_yaw_rate_rad_s = read();
+  }
+
+  void read(OneModel& master) { master.params.acceleration_m_s2 = read(); }
+
+  void read(AccelerationNoise<float>& noise) {
+    noise.position = read();
+    noise.velocity = read();
+    noise.acceleration = read();
+  }
+
+  void read(ThreeModels& master) {
+    master.params.switch_rate_hz = read();
+    for (int k = 0; k < ThreeModels::kModes; ++k) master.params.share(k) = read();
+    ConstantVelocity<float>& straight = master.models.first;
+    straight.params.velocity = read();
+    straight.params.sigma_acceleration_m_s2 = read();
+    read(master.models.rest.first.params);
+    CoordinatedTurn<float>& turning = master.models.rest.rest.first;
+    read(turning.params.noise);
+    turning.params.slow_m_s = read();
+  }
+
+  void write(Status status) { stream_.write(static_cast<std::uint32_t>(status)); }
+
   void write(float value) { stream_.write(math::to_bits(value)); }
 
   template <int Size>
@@ -146,13 +358,14 @@ class Replay {
   }
 
   Stream& stream_;
+  std::uint32_t kind_ = 0;
   int particles_ = 0;
-  std::uint32_t readings_ = 0;
-  Status status_ = Status::kOk;
+  int room_ = 0;
+  int told_ = 0;
+  float resample_below_, gate_, birth_velocity_m_s_, birth_acceleration_m_s2_, kept_;
+  bool carry_covariance_;
+  Rows rows_{*this, 0, 0, false, {}};
   math::Random random_{0};
-  Motion motion_;
-  Master master_;
-  SlatfParams<float> params_;
   Sonar<float> sonar_;
 };
 

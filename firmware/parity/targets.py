@@ -181,25 +181,29 @@ TARGETS = (
 )
 
 
-# ---- SLATF ---------------------------------------------------------------------------------------
+# ---- SLAT ----------------------------------------------------------------------------------------
 
 #: Particles of the paper; and what the RAM of the ATmega2560 holds beside the stack: whole blocks
 #: of 16 (auvest/particles/lanes.hpp).
 PARTICLES, AVR_PARTICLES = 100, 48
 
+#: Masters that the programs off the ATmega2560 have room for.
+MASTERS = 2
 
-def _slatf(target: Target, name: str = "", *flags: str) -> Target:
-    capacity = AVR_PARTICLES if target.machine == "avr" else PARTICLES
-    flags = (*target.flags, f"-DAUVEST_PARTICLES={capacity}", *flags)
+
+def _slat(target: Target, name: str = "", *flags: str) -> Target:
+    if target.machine != "avr":  # there the program is of one record, see Record.program()
+        flags = (f"-DAUVEST_PARTICLES={PARTICLES}", f"-DAUVEST_MASTERS={MASTERS}", *flags)
+    flags = (*target.flags, *flags)
     return replace(target, name=target.name + name, flags=flags, header="slatf_replay.hpp")
 
 
-#: The same for SLATF; on the host also in lanes: of SSE2, and of the widest set that there is.
-#: (gcc's lanes against its scalar code: tests/cpp/simd.)
+#: The same for the filters that localise and track; on the host SLATF 1.0 and 2.0 also in lanes: of
+#: SSE2, and of the widest set that there is. (gcc's lanes against its scalar code: tests/cpp/simd.)
 SLATF_TARGETS = (
-    *map(_slatf, TARGETS),
+    *map(_slat, TARGETS),
     *(
-        _slatf(target, f"-{lanes}", f"-DAUVEST_LANES={lanes}")
+        _slat(target, f"-{lanes}", f"-DAUVEST_LANES={lanes}", "-DAUVEST_KINDS=0xf")
         for target in TARGETS
         if target.name == "clang-O3-march=native"
         for lanes in ("sse2", "default_arch")

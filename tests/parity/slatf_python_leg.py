@@ -1,77 +1,89 @@
-"""A record of SLATF in Python: through the public class, as a user would."""
+"""A record of a filter that localises and tracks, in Python: through its class, as a user would."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from auvest import CompassMotion, PiecewiseAcceleration, Slatf, Sonar
+from auvest import EkfSlat, Slatf, SlatfJoint
+from auvest.slat import SlatFilter
 from firmware.parity.slatf import Record
 from tests.parity.python_leg import bits
 
-#: What the public class shows of a trace's row, floats as their bits.
-FIELDS = (
-    "slave_x",
-    "slave_P",
-    "master_x",
-    "master_P",
-    "effective_size",
-    "log_likelihood",
-    "resamplings",
-)
-
 
 def replay_in_python(record: Record, lanes: str) -> tuple[np.ndarray, np.ndarray]:
-    """Run a record through `Slatf`.
+    """Run a record through its filter, reading by reading.
 
     Parameters
     ----------
     record : Record
     lanes : str
-        The instruction set in whose lanes the particles run.
+        The instruction set in whose lanes the particles of a `Slatf` run.
 
     Returns
     -------
-    trace : ndarray, dtype record.trace, shape (echoes,)
-        With the fields of `FIELDS` filled in.
-    poses : ndarray of uint32, shape (echoes, particles, 2)
+    trace : ndarray, dtype record.trace
+        What the class shows of it: all but the particles.
+    poses : ndarray of uint32, shape (rows, particles, pose)
         Bits of the particles' poses.
     """
-    world = record.world
-    slatf = Slatf(
-        world.slave["x"],
-        _symmetric(world.slave["P"], 2),
-        version=1 if record.kind == "slatf1" else 2,
-        particles=record.particles,
-        motion=CompassMotion(
-            sigma_speed_m_s=record.sigma_speed_m_s,
-            sigma_heading_rad=record.sigma_heading_rad,
-            compensate_bias=record.compensate_bias,
-        ),
-        master=PiecewiseAcceleration(acceleration_m_s2=record.acceleration_m_s2),
-        sonar=Sonar(sigma_range_m=record.sigma_range_m, sigma_bearing_rad=record.sigma_bearing_rad),
-        resample_below=record.resample_below,
-        gate=record.gate,
-        lanes=lanes,
-        dtype="float32",
-        seed=record.seed,
-    )
-    slatf.add_master(world.master["x"], _symmetric(world.master["P"], 6))
+    slat = _filter(record, lanes)
+    for master in record.world.masters[: record.told]:
+        slat.add_master(master["x"], _symmetric(master["P"], 6))
     rows, poses = [], []
-    for reading in world.readings:
-        slatf.predict(float(reading["dt"]), reading["u"], changes=reading["change"][None])
-        if not reading["heard"]:
-            continue
-        slatf.update(reading["z"][None])
-        row = np.zeros((), record.trace)
-        master_x, master_P = slatf.master(0)
-        row["slave_x"], row["slave_P"] = bits(slatf.x), bits(slatf.P[np.tril_indices(2)])
-        row["master_x"], row["master_P"] = bits(master_x), bits(master_P[np.tril_indices(6)])
-        row["effective_size"] = bits(slatf.effective_size)
-        row["log_likelihood"] = bits(slatf.log_likelihood)
-        row["resamplings"] = slatf.resamplings
-        rows.append(row)
-        poses.append(bits(slatf.poses))
+    for step in record.world.steps:
+        changes = step.changes[None] if record.planned else None
+        heard: dict[str, Any] = {}
+        if len(step.echoes):
+            heard = {"z": step.echoes["z"], "z_time_s": step.echoes["after_s"]}
+            heard["master"] = step.echoes["master"]
+        slat.run([0.0, float(step.dt)], step.u[None], changes=changes, **heard)
+        if len(step.echoes):
+            rows.append(_row(slat, record))
+            poses.append(bits(slat.poses) if record.particles else ())
     return np.array(rows), np.array(poses)
+
+
+def _filter(record: Record, lanes: str) -> SlatFilter:
+    slave = record.world.slave
+    start = slave["x"], _symmetric(slave["P"], record.motion.pose_states)
+    models: dict[str, Any] = {"motion": record.motion, "sonar": record.sonar, "gate": record.gate}
+    models |= {"master": record.master, "dtype": "float32"}
+    if record.kind.startswith("ekf"):
+        return EkfSlat(*start, **models)
+    particles = {"particles": record.particles, "seed": record.seed}
+    particles |= {"resample_below": record.resample_below}
+    if record.kind.startswith("slatf-joint"):
+        return SlatfJoint(*start, **models, **particles, kept=record.kept, max_masters=record.room)
+    return Slatf(
+        *start,
+        **models,
+        **particles,
+        version=1 if record.kind.startswith("slatf1") else 2,
+        carry_covariance=record.carry_covariance,
+        birth_velocity_m_s=record.birth_velocity_m_s,
+        birth_acceleration_m_s2=record.birth_acceleration_m_s2,
+        lanes=lanes,
+    )
+
+
+def _row(slat: SlatFilter, record: Record) -> np.ndarray:
+    row = np.zeros((), record.trace)
+    pose = record.motion.pose_states
+    row["slave_x"], row["slave_P"] = bits(slat.x), bits(slat.P[np.tril_indices(pose)])
+    for n in range(slat.masters):
+        x, P = slat.master(n)
+        master = row["masters"][n]
+        master["x"], master["P"] = bits(x), bits(P[np.tril_indices(6)])
+        if "modes" in master.dtype.names:
+            master["modes"] = bits(slat.mode_probabilities(n))
+    for name in ("effective_size", "log_likelihood", "nis"):
+        if name in row.dtype.names:
+            row[name] = bits(getattr(slat, name))
+    if record.particles:
+        row["resamplings"] = slat.resamplings
+    return row
 
 
 def _symmetric(lower: np.ndarray, n: int) -> np.ndarray:
