@@ -19,6 +19,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 
@@ -28,7 +29,7 @@ from auvest.scenarios import cooperative
 from auvest.scenarios.paper_aukf import FilterName, paper_filter, paper_noise
 from auvest.scenarios.tracking import Scenario, Track, simulate
 from firmware.package import PackageError, package
-from firmware.parity.slatf import FIELDS, paper_world
+from firmware.parity.slatf import fields_of, paper_world
 from firmware.parity.targets import AVR_PARTICLES
 from firmware.sketch import Compiled, SketchError, compile_sketch
 
@@ -47,7 +48,10 @@ TOLERANCE = 0.02
 STEPS = {"ekf": 1_000, "ukf": 1_000, "aukf": 10_000, "aukf_covariance_budget": 1_000}
 STEPS.update(robust_ekf_predict=1_000, robust_ekf_update=1_000)
 
-#: Echoes that SLATF is measured over, and the seconds between two of them.
+#: Particles of SlatfJoint: whole blocks that the RAM holds beside the stack.
+JOINT_PARTICLES = 16
+
+#: Echoes that SLATF and its relatives are measured over, and the seconds between two of them.
 ECHOES = 25
 SONAR_PERIOD_S = 2.0
 
@@ -102,13 +106,32 @@ _ADAPTIVE_STEP = """auvest::Status status = filter.predict(filter.interval());
   return status;"""
 
 
-def _filter(kind: str, arguments: str, step: str) -> tuple[str, dict[str, str]]:
+#: A template in SKETCHES, and what stands in its places.
+Program: TypeAlias = tuple[str, Mapping[str, str]]
+
+
+def _filter(kind: str, arguments: str, step: str) -> Program:
     return "filter", {"FILTER": kind, "ARGUMENTS": arguments, "STEP": step}
 
 
-#: Template in SKETCHES of each program, and what stands in its places. The two programs of the
-#: range filter are one, of which the section with number 1 is reported.
-_PROGRAMS: Mapping[str, tuple[str, Mapping[str, str]]] = {
+def _slat(kind: str, particles: int = 0, master: str = "PiecewiseAcceleration<float>") -> Program:
+    """Give a filter that localises and tracks, with particles or, with 0 of them, without."""
+    places = {"KIND": kind, "MASTER": master, "STORAGE": "", "PARTICLES": ""}
+    if particles:
+        places["STORAGE"] = f"Filter::Storage<{particles}> particles;"
+        places["PARTICLES"] = ", particles"
+    return "slatf", places
+
+
+_IMM = "Imm<{}>".format(
+    ", ".join(
+        f"auvest::{model}<float>"
+        for model in ("ConstantVelocity", "ExactAcceleration", "CoordinatedTurn")
+    )
+)
+
+#: The two programs of the range filter are one, of which the section with number 1 is reported.
+_PROGRAMS: Mapping[str, Program] = {
     "empty": ("empty", {}),
     "ekf": _filter("auvest::Ekf<Process>", "Process()", _FIXED_STEP),
     "ukf": _filter("auvest::Ukf<Process>", "Process(), points()", _FIXED_STEP),
@@ -120,8 +143,11 @@ _PROGRAMS: Mapping[str, tuple[str, Mapping[str, str]]] = {
     ),
     "robust_ekf_predict": ("range_filter", {"PREDICT": "1", "UPDATE": "2"}),
     "robust_ekf_update": ("range_filter", {"PREDICT": "2", "UPDATE": "1"}),
-    "slatf1": ("slatf", {"KIND": "Slatf1", "PARTICLES": str(AVR_PARTICLES)}),
-    "slatf2": ("slatf", {"KIND": "Slatf2", "PARTICLES": str(AVR_PARTICLES)}),
+    "slatf1": _slat("Slatf1", AVR_PARTICLES),
+    "slatf2": _slat("Slatf2", AVR_PARTICLES),
+    "slatf_joint": _slat("SlatfJoint", JOINT_PARTICLES),
+    "ekf_slat": _slat("EkfSlat"),
+    "ekf_slat_imm": _slat("EkfSlat", master=_IMM),
 }
 
 
@@ -402,10 +428,12 @@ def page(rows: list[Row]) -> str:
         "heading and one range, M-estimation EKF of two states with IGG and the recovery, a range",
         "of ten an outlier, and a lock-out half-way; the same program, its two halves.",
         f"`slatf1` and `slatf2`: N = {AVR_PARTICLES}, one master, two predictions and one echo,",
-        f"{ECHOES} times at the beginning of the paper's scenario. The examples: `first_steps` is",
-        "its whole run, serial text included; `replay` counts predict, update and feedback by the",
-        "chip's timer; `tracking_loop` counts the cycles awake between two samples,",
-        "`slave_tracking` those between two pings, serial text included.",
+        f"{ECHOES} times at the beginning of the paper's scenario; `slatf_joint`: the same with",
+        f"N = {JOINT_PARTICLES}; `ekf_slat` and, with the three models of an `Imm` for the master,",
+        "`ekf_slat_imm`: the same without particles. The examples: `first_steps` is its whole run,",
+        "serial text included; `replay` counts predict, update and feedback by the chip's timer;",
+        "`tracking_loop` counts the cycles awake between two samples, `slave_tracking` those",
+        "between two pings, serial text included.",
         "",
         "Flash and static RAM are what the IDE reports (bytes); the stack is the deepest of the",
         "whole run from the end of the RAM, interrupts included.",
@@ -439,15 +467,18 @@ def slatf_page(rows: list[Row]) -> list[str]:
         "| program | particles | cycles per particle and step | of the sonar period |",
         "|---|---:|---:|---:|",
     ]
-    for name in ("slatf1", "slatf2", "slave_tracking"):
+    counts = dict.fromkeys(("slatf1", "slatf2", "slave_tracking"), AVR_PARTICLES)
+    counts.update(slatf_joint=JOINT_PARTICLES, ekf_slat=0, ekf_slat_imm=0)
+    for name, particles in counts.items():
         cycles = by_name[name].cycles_median
         if cycles is None:
             raise BudgetError(f"{name} has no cycles")
         share = cycles / (16e6 * SONAR_PERIOD_S)
-        lines.append(f"| `{name}` | {AVR_PARTICLES} | {cycles // AVR_PARTICLES:,} | {share:.1%} |")
+        each = f"{cycles // particles:,}" if particles else ""
+        lines.append(f"| `{name}` | {particles or ''} | {each} | {share:.1%} |")
     slave = by_name["slave_tracking"]
     asleep = 1 - awake_share(slave)
-    particles = 4 * FIELDS["slatf2"] * AVR_PARTICLES
+    particles = 4 * fields_of("slatf2") * AVR_PARTICLES
     return [
         *lines,
         "",

@@ -31,7 +31,7 @@ class Filter:
         Whether ``auvest replay`` takes it; whether it is built for the vehicle; whether the parity
         tests show the same bits on every target; whether docs/budgets.md has what it costs there.
     note : str
-        Why it is for the desk only, if it is.
+        Why it is for the desk only, if it is; or what of it does not run everywhere.
     """
 
     name: str
@@ -82,7 +82,7 @@ class Filter:
 
 
 _EVERYWHERE = {"chip": True, "parity": True, "budget": True}
-_NO_RECORD = "no record of it is replayed on the targets yet"
+_IMM_TOO_LARGE = "with an Imm not on the ATmega2560: 16 particles take more than 7 of its 8 KB"
 
 FILTERS: dict[str, Filter] = {
     name: Filter(name=name, cls=cls, title=title, family=family, **where)  # type: ignore[arg-type]
@@ -96,10 +96,10 @@ FILTERS: dict[str, Filter] = {
             "robust-ukf", "RobustUkf", "robust UKF", "gaussian",
             {"replay": True, "chip": True, "parity": True},
         ),
-        ("slatf1", "Slatf", "SLATF 1.0", "slat", _EVERYWHERE),
-        ("slatf2", "Slatf", "SLATF 2.0", "slat", _EVERYWHERE),
-        ("slatf-joint", "SlatfJoint", "SLATF, joint", "slat", {"note": _NO_RECORD}),
-        ("ekf-slat", "EkfSlat", "EKF-SLAT", "slat", {"note": _NO_RECORD}),
+        ("slatf1", "Slatf", "SLATF 1.0", "slat", {**_EVERYWHERE, "note": _IMM_TOO_LARGE}),
+        ("slatf2", "Slatf", "SLATF 2.0", "slat", {**_EVERYWHERE, "note": _IMM_TOO_LARGE}),
+        ("slatf-joint", "SlatfJoint", "SLATF, joint", "slat", _EVERYWHERE),
+        ("ekf-slat", "EkfSlat", "EKF-SLAT", "slat", _EVERYWHERE),
         (
             "dead-reckoning", "DeadReckoning", "dead reckoning", "slat",
             {"note": "what the others are compared with"},

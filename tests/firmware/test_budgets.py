@@ -34,6 +34,7 @@ def test_every_filter_and_example_is_measured(rows, root):
     examples = {path.name for path in (root / "firmware/library/examples").iterdir()}
     filters = {"ekf", "ukf", "aukf", "aukf_covariance_budget", "slatf1", "slatf2"}
     filters |= {"robust_ekf_predict", "robust_ekf_update"}
+    filters |= {"slatf_joint", "ekf_slat", "ekf_slat_imm"}
     assert rows.keys() >= examples | filters | {"empty"}
 
 

@@ -6,6 +6,8 @@ The world is the paper's scenario. What the sketch reported as measured is repla
 
 import re
 from dataclasses import dataclass, field
+from functools import reduce
+from operator import getitem
 
 import numpy as np
 import pytest
@@ -24,22 +26,22 @@ PARTICLES = 48
 SOUND_M_S = 1500.0
 HOST = SLATF_TARGETS[0]
 
-#: Column of the sketch, field of the host's trace and place in it.
+#: Column of the sketch, and the way to it in a row of the host's trace.
 ESTIMATES = {
     "x_m": ("slave_x", 0),
     "y_m": ("slave_x", 1),
     "P00_m2": ("slave_P", 0),
     "P10_m2": ("slave_P", 1),
     "P11_m2": ("slave_P", 2),
-    "master_x_m": ("master_x", 0),
-    "master_y_m": ("master_x", 1),
-    "master_vx_m_s": ("master_x", 2),
-    "master_vy_m_s": ("master_x", 3),
-    "master_P00_m2": ("master_P", 0),
-    "master_P10_m2": ("master_P", 1),
-    "master_P11_m2": ("master_P", 2),
-    "n_eff": ("effective_size", ()),
-    "resamplings": ("resamplings", ()),
+    "master_x_m": ("masters", 0, "x", 0),
+    "master_y_m": ("masters", 0, "x", 1),
+    "master_vx_m_s": ("masters", 0, "x", 2),
+    "master_vy_m_s": ("masters", 0, "x", 3),
+    "master_P00_m2": ("masters", 0, "P", 0),
+    "master_P10_m2": ("masters", 0, "P", 1),
+    "master_P11_m2": ("masters", 0, "P", 2),
+    "n_eff": ("effective_size",),
+    "resamplings": ("resamplings",),
 }
 
 
@@ -150,8 +152,8 @@ def assert_same_bits(run, trace):
     """Every estimate after an echo is the host's; they are floats, so equality means equal bits."""
     heard = [row for row in run.rows if np.isfinite(row["range_m"])]
     for row, wanted in zip(heard, trace, strict=True):
-        for name, (part, place) in ESTIMATES.items():
-            value = wanted[part][place] if place != () else wanted[part]
+        for name, way in ESTIMATES.items():
+            value = reduce(getitem, way, wanted)
             value = float(value if name == "resamplings" else value.view(np.float32))
             assert row[name] == value, (
                 f"sample {row['sample']:.0f}, {name}: {row[name]!r} on the chip, {value!r} here"

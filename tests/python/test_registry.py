@@ -13,6 +13,7 @@ from auvest.cli import app
 from auvest.registry import FILTERS, filter_named, replayable
 from auvest.replay.config import FilterName
 from firmware.budgets import read_budgets
+from firmware.parity import slatf
 from tests.parity import records, robust_records
 
 
@@ -37,7 +38,10 @@ def test_every_filter_that_claims_parity_has_a_record() -> None:
     replayed = {record.kind for record in records.all_records()}
     kinds = {record.filter.__name__ for record in robust_records.all_records()}
     replayed |= {name for name, entry in FILTERS.items() if entry.cls in kinds}
-    replayed |= {"slatf1", "slatf2"}  # firmware/parity/slatf.py
+    # Of a SLAT record the kind begins with the filter's name; motion and master follow.
+    slat_kinds = {f"{record.kind}-" for record in slatf.all_records(chip=True).values()}
+    slat_names = {name for name, entry in FILTERS.items() if entry.family == "slat"}
+    replayed |= {name for name in slat_names if any(k.startswith(f"{name}-") for k in slat_kinds)}
     assert {name for name, entry in FILTERS.items() if entry.parity} == replayed
 
 

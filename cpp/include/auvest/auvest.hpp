@@ -32,6 +32,7 @@
 #include "auvest/models/sonar.hpp"
 #include "auvest/models/speed_heading.hpp"
 #include "auvest/models/white_acceleration.hpp"
+#include "auvest/records/run.hpp"
 #include "auvest/robust/hampel.hpp"
 #include "auvest/robust/huber.hpp"
 #include "auvest/robust/igg.hpp"
