@@ -77,10 +77,9 @@ class Replay {
     particles_ = static_cast<int>(stream_.read());
     room_ = static_cast<int>(stream_.read());
     told_ = static_cast<int>(stream_.read());
-    rows_.readings = stream_.read();
-    rows_.room = room_;
+    readings_ = stream_.read();
     random_ = math::Random(stream_.read());
-    rows_.planned = stream_.read() != 0;
+    planned_ = stream_.read() != 0;
     resample_below_ = read();
     carry_covariance_ = stream_.read() != 0;
     gate_ = read();
@@ -182,7 +181,8 @@ class Replay {
 
   template <class Filter>
   void follow(Filter& filter) {
-    run_record<Row>(filter, rows_, sonar_, random_, [&](const Row& row, Status status) {
+    const auto next = [this](Row& row) { return this->next(row); };
+    run_record<Row>(filter, next, sonar_, random_, [&](const Row& row, Status status) {
       if (row.count > 0) show(filter);
       if (row.count > 0 || status != Status::kOk) write(status);
     });
@@ -271,33 +271,25 @@ class Replay {
 
   // ---- Words -----------------------------------------------------------------------------------
 
-  /// The readings that are left, from the stream.
-  struct Rows {
-    Replay& replay;
-    std::uint32_t readings;
-    int room;
-    bool planned;
-    TimedEcho<float, float> echoes[kMasters];
-
-    AUVEST_OUTLINE bool next(Row& row) {
-      if (readings == 0) return false;
-      --readings;
-      row.from_s = 0.0f;
-      row.to_s = replay.read();
-      replay.read(row.u);
-      row.planned = planned;
-      for (Vector<float, 2>& change : row.changes) math::set_zero(change);
-      for (int n = 0; n < room; ++n) replay.read(row.changes[n]);
-      row.echoes = echoes;
-      row.count = static_cast<int>(replay.stream_.read());
-      for (int s = 0; s < row.count; ++s) {
-        echoes[s].time_s = replay.read();
-        replay.read(echoes[s].echo.z);
-        echoes[s].echo.master = static_cast<int>(static_cast<std::int32_t>(replay.stream_.read()));
-      }
-      return true;
+  /// The next reading; false where none is left.
+  AUVEST_OUTLINE bool next(Row& row) {
+    if (readings_ == 0) return false;
+    --readings_;
+    row.from_s = 0.0f;
+    row.to_s = read();
+    read(row.u);
+    row.planned = planned_;
+    for (Vector<float, 2>& change : row.changes) math::set_zero(change);
+    for (int n = 0; n < room_; ++n) read(row.changes[n]);
+    row.echoes = echoes_;
+    row.count = static_cast<int>(stream_.read());
+    for (int s = 0; s < row.count; ++s) {
+      echoes_[s].time_s = read();
+      read(echoes_[s].echo.z);
+      echoes_[s].echo.master = static_cast<int>(static_cast<std::int32_t>(stream_.read()));
     }
-  };
+    return true;
+  }
 
   float read() { return math::from_bits(stream_.read()); }
 
@@ -362,9 +354,10 @@ class Replay {
   int particles_ = 0;
   int room_ = 0;
   int told_ = 0;
+  std::uint32_t readings_ = 0;
   float resample_below_, gate_, birth_velocity_m_s_, birth_acceleration_m_s2_, kept_;
-  bool carry_covariance_;
-  Rows rows_{*this, 0, 0, false, {}};
+  bool carry_covariance_, planned_;
+  TimedEcho<float, float> echoes_[kMasters];  // of the reading
   math::Random random_{0};
   Sonar<float> sonar_;
 };

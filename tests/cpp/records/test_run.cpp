@@ -129,22 +129,19 @@ TEST_CASE("What cannot be is refused at its place") {
 }
 
 TEST_CASE("A filter that refuses ends the row and the record; the sink sees it") {
-  struct Two {
-    std::vector<Echo> echoes{echo(12.0, 1, 0)};
+  const std::vector<Echo> echoes{echo(12.0, 1, 0)};
+  for (const Status answer : {Status::kOk, Status::kOverflow}) {
     int left = 2;
-    bool next(Row& r) {
+    const auto next = [&](Row& r) {
       r = row(echoes);
       return left-- > 0;
-    }
-  };
-  for (const Status answer : {Status::kOk, Status::kOverflow}) {
-    Two rows;
+    };
     Diary diary;
     diary.answer = answer;
     Random random(1);
     std::vector<Status> seen;
     const Status status =
-        auvest::run_record<Row>(diary, rows, Sonar(), random, [&](const Row& r, Status s) {
+        auvest::run_record<Row>(diary, next, Sonar(), random, [&](const Row& r, Status s) {
           CHECK(r.count == 1);
           seen.push_back(s);
         });

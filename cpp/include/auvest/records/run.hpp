@@ -2,8 +2,8 @@
 // odometry that holds for some time, and what the sonar heard in that time; there the interval is
 // split, so that every echo meets the filter at its own moment.
 //
-//     bool next(row);                          of `rows`: false at the end
-//     run_record(filter, rows, sonar, random, [](const Row& row, Status status) { ... });
+//     run_record<Row>(filter, [](Row& row) { ... },  // fills the next row; false at the end
+//                     sonar, random, [](const Row& row, Status status) { ... });
 //
 // Time: the type of the times. What the filter is told are differences of them, so that it may be a
 // float where every row has a clock of its own that begins with 0; else a double.
@@ -77,14 +77,14 @@ Status run_row(Filter& filter, const Row& row, const Sonar<typename Row::Scalar>
   }
 }
 
-/// Takes the filter through all rows and hands each to `sink(row, status)`, after it. Stops at the
-/// first status that is not kOk and returns it.
-template <class Row, class Filter, class Rows, class Sink>
-Status run_record(Filter& filter, Rows& rows, const Sonar<typename Row::Scalar>& sonar,
+/// Takes the filter through the rows that `next(row)` fills in until it is false, and hands each to
+/// `sink(row, status)`, after it. Stops at the first status that is not kOk and returns it.
+template <class Row, class Filter, class Next, class Sink>
+Status run_record(Filter& filter, Next&& next, const Sonar<typename Row::Scalar>& sonar,
                   math::Random& random, Sink&& sink) {
   Row row;
   Status status = Status::kOk;
-  while (status == Status::kOk && rows.next(row)) {
+  while (status == Status::kOk && next(row)) {
     status = run_row(filter, row, sonar, random);
     sink(row, status);
   }
