@@ -17,12 +17,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from firmware.parity.slatf import Record as SlatfRecord
+from firmware.parity import slatf
 from tests.parity import python_leg, records, robust_records, slatf_python_leg
 
 FILE = Path(__file__).with_name("golden.json")
 GOLDEN: dict[str, list[str]] = json.loads(FILE.read_text(encoding="utf-8"))
-PARTICLES = 100
 
 
 def digest(*arrays: np.ndarray | bytes) -> str:
@@ -45,9 +44,8 @@ def all_traces() -> dict[str, Callable[[], list[str]]]:
             digest(r.to_bytes()),
             digest(r.replay_in_python()),
         ]
-    for kind in ("slatf1", "slatf2"):
-        record = SlatfRecord(kind, PARTICLES)
-        found[f"slat/{kind}"] = lambda r=record: [
+    for name, slat_record in slatf.all_records().items():
+        found[f"slat/{name}"] = lambda r=slat_record: [
             digest(r.to_bytes()),
             digest(*slatf_python_leg.replay_in_python(r, "scalar")),
         ]
