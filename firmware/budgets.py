@@ -49,7 +49,7 @@ STEPS = {"ekf": 1_000, "ukf": 1_000, "aukf": 10_000, "aukf_covariance_budget": 1
 STEPS.update(robust_ekf_predict=1_000, robust_ekf_update=1_000)
 
 #: Particles of SlatfJoint: whole blocks that the RAM holds beside the stack.
-JOINT_PARTICLES = 16
+JOINT_PARTICLES = 32
 
 #: Echoes that SLATF and its relatives are measured over, and the seconds between two of them.
 ECHOES = 25
