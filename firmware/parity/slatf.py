@@ -203,7 +203,7 @@ def encounter(
             echo["after_s"], echo["z"], echo["master"] = after, z, n if known else -1
         changes = [_master(k + 1.0, n)[1] - _master(float(k), n)[1] for n in range(masters)]
         u = np.array([speed, turn], "<f4")
-        steps.append(Step(np.float32(1.0), u, np.array(changes, "<f4"), echoes))
+        steps.append(Step(np.array(1.0, "<f4"), u, np.array(changes, "<f4"), echoes))
     slave = np.zeros((), SLAVE if compass else SLAVE_WITH_HEADING)
     slave["x"][2:] = _START_RAD
     slave["P"][[0, 2]] = 0.25
@@ -309,15 +309,18 @@ class Record:
             changes = np.zeros((self.room, 2), "<f4")
             known = step.changes[: self.room]
             changes[: len(known)] = known
-            parts += [np.float32(step.dt), step.u, changes, np.uint32(len(step.echoes))]
-            parts.append(step.echoes)
+            parts += [step.dt, step.u, changes, np.array(len(step.echoes), "<u4"), step.echoes]
         return b"".join(part.tobytes() for part in parts)
 
     def _master_numbers(self) -> npt.NDArray[Any]:
         if isinstance(self.master, PiecewiseAcceleration):
             return np.array([self.master.acceleration_m_s2], "<f4")
-        models = [self.master.straight, self.master.accelerated, self.master.turning]
-        numbers = [v for m in models for v in asdict(m).values() if not isinstance(v, str)]
+        models: list[dict[str, Any]] = [
+            asdict(self.master.straight),
+            asdict(self.master.accelerated),
+            asdict(self.master.turning),
+        ]
+        numbers = [v for model in models for v in model.values() if not isinstance(v, str)]
         return np.array([self.master.switch_rate_hz, *self.master.share, *numbers], "<f4")
 
     def program(self, target: Target) -> tuple[str, ...]:
@@ -401,13 +404,14 @@ def all_records(*, chip: bool = False) -> dict[str, Record]:
         fit. A Slatf with an Imm is not among them: its smallest set of particles does not fit.
     """
     particles, room = (16, 1) if chip else (PARTICLES, MASTERS)
-    compass = {"motion": CompassMotion(sigma_speed_m_s=0.1, sigma_heading_rad=0.05)}
-    near = {"sonar": Sonar(sigma_range_m=0.5, sigma_bearing_rad=0.02)}
+    compass: dict[str, Any] = {
+        "motion": CompassMotion(sigma_speed_m_s=0.1, sigma_heading_rad=0.05),
+        "sonar": Sonar(sigma_range_m=0.5, sigma_bearing_rad=0.02),
+    }
     unicycle: dict[str, Any] = {
         "motion": UnicycleMotion(),
         "sonar": Sonar(sigma_range_m=0.5, sigma_bearing_rad=0.02, bearing="from_heading"),
     }
-    compass = {**compass, **near}
 
     def met(kind: Kind, masters: int, *, known: bool = False, **settings: Any) -> Record:
         models = {**(unicycle if "unicycle" in kind else compass), **settings}
