@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "any_slat.hpp"
+#include "auvest/records/run.hpp"
 #include "auvest/slat/outage.hpp"
 #include "binders.hpp"
 #include "plain.hpp"
@@ -285,11 +286,6 @@ class SlatBinder {
       }
       return true;
     }
-    static void fill(Echo& echo, const Scalar* z, std::int64_t master) {
-      echo.z(0) = z[0];
-      echo.z(1) = z[1];
-      echo.master = static_cast<int>(master);
-    }
 
    private:
     static bool take_masters(py::handle master, py::ssize_t rows, int masters, bool unknown,
@@ -446,6 +442,8 @@ class SlatBinder {
     return outage.filter().readings();
   }
 
+  using Row = SlatRow<Scalar, Any::kMasters, double>;
+
   /// A record of T readings: reading k, u[k], holds from time_s[k] to time_s[k + 1]. Echoes come in
   /// the order of their times, all within the record; those of the same time are one update. Row k
   /// of what is returned is the state of affairs at time_s[k + 1]. `changes` (T, masters, 2): the
@@ -490,52 +488,43 @@ class SlatBinder {
     Scalar* likelihood_out = log_likelihood.mutable_data();
     Scalar* nis_out = nis.mutable_data();
     const double* time = time_s.data();
-    const double* heard_at = echo_time_s.data();
 
+    std::vector<TimedEcho<Scalar, double>> heard(static_cast<std::size_t>(echoes));
+    for (py::ssize_t k = 0; k < echoes; ++k) {
+      TimedEcho<Scalar, double>& one = heard[static_cast<std::size_t>(k)];
+      one.time_s = echo_time_s.data()[k];
+      for (int i = 0; i < 2; ++i) one.echo.z(i) = z.data()[2 * k + i];
+      one.echo.master = static_cast<int>(master.data()[k]);
+    }
+    const auto* left = heard.data();
+    const auto* const end = left + echoes;
     py::ssize_t done = 0;
-    py::ssize_t heard = 0;
     Status status = Status::kOk;
     {
       py::gil_scoped_release release;
       const Scalar nan = std::numeric_limits<Scalar>::quiet_NaN();
       std::fill_n(masters_x_out, masters_x.size(), nan);
       std::fill_n(masters_p_out, masters_p.size(), nan);
-      // Takes in the echoes of one time.
-      const auto listen = [&]() {
-        Echo group[Any::kMasters];
-        int count = 0;
-        const double now = heard_at[heard];
-        for (; heard < echoes && heard_at[heard] == now; ++heard, ++count) {
-          if (count == Any::kMasters) return Status::kBadParameter;
-          Echoes::fill(group[count], z.data() + 2 * heard, master.data()[heard]);
-        }
-        return filter.update(group, count, sonar, random);
-      };
-      for (; done < rows && status == Status::kOk; ++done) {
-        const double end = time[done + 1];
-        double now = time[done];
-        while (status == Status::kOk) {
-          if (heard < echoes && heard_at[heard] == now) status = listen();
-          if (status != Status::kOk || now == end) break;
-          const bool stop = heard < echoes && heard_at[heard] < end;
-          const double next = stop ? heard_at[heard] : end;
-          typename Any::Control reading;
-          for (int i = 0; i < 2; ++i) reading(i) = u.data()[2 * done + i];
-          Change plan[Any::kMasters];
-          const Scalar share = next - now == end - time[done]
-                                   ? Scalar(1)
-                                   : static_cast<Scalar>((next - now) / (end - time[done]));
+      const auto next = [&](Row& row) {
+        if (done == rows) return false;
+        row.from_s = time[done];
+        row.to_s = time[done + 1];
+        row.planned = planned;
+        for (int i = 0; i < 2; ++i) {
+          row.u(i) = u.data()[2 * done + i];
           for (int n = 0; n < Any::kMasters; ++n) {
-            for (int i = 0; i < 2; ++i) {
-              plan[n](i) = planned && n < plans ? share * changes.data()[(done * plans + n) * 2 + i]
-                                                : Scalar(0);
-            }
+            const bool known = planned && n < plans;
+            row.changes[n](i) = known ? changes.data()[(done * plans + n) * 2 + i] : Scalar(0);
           }
-          status = filter.predict(static_cast<Scalar>(next - now), reading, random,
-                                  planned ? plan : nullptr);
-          now = next;
         }
-        if (status != Status::kOk) break;
+        // An echo between two readings is of the first.
+        row.echoes = left;
+        while (left != end && left->time_s <= row.to_s) ++left;
+        row.count = static_cast<int>(left - row.echoes);
+        return true;
+      };
+      status = run_record<Row>(filter, next, sonar, random, [&](const Row&, Status taken) {
+        if (taken != Status::kOk) return;
         const SlatReadings<Scalar> readings = readings_of(filter);
         const auto slave = filter.slave();
         copy_to(slave.x, x_out + done * kPose);
@@ -550,11 +539,11 @@ class SlatBinder {
         resamplings_out[done] = readings.resamplings;
         likelihood_out[done] = readings.log_likelihood;
         nis_out[done] = readings.nis;
-      }
+        ++done;
+      });
     }
     py::dict result;
     result["done"] = done;
-    result["heard"] = heard;
     result["status"] = status;
     result["x"] = x;
     result["P"] = p;

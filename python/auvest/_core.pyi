@@ -366,7 +366,6 @@ class Sonar_float64(_Sonar): ...
 
 class _SlatRun(TypedDict, Generic[_Array]):
     done: int
-    heard: int
     status: Status
     x: _Array
     P: _Array

@@ -176,12 +176,13 @@ def test_the_record_is_worth_it(name, chip, wanted):
     assert rows["resamplings"][-1] > (150 if name == "slatf1" else 20)
 
 
-@pytest.mark.parametrize("chip", [False, True])
-@pytest.mark.parametrize("name", RECORDS)
+BOTH = [(name, False) for name in RECORDS] + [(name, True) for name in ON_CHIP]
+MEETING = [(name, chip) for name, chip in BOTH if name not in PAPER]
+
+
+@pytest.mark.parametrize(("name", "chip"), BOTH)
 def test_the_trace_is_sound(name, chip, wanted):
     """No status, no number that is none, and means that are the particles'."""
-    if chip and name not in ON_CHIP:
-        pytest.skip("does not fit into the chip")
     rows = wanted(name, chip=chip)
     assert not rows["status"].any()
     assert np.isfinite(rows.copy().view("<f4")).all()
@@ -194,12 +195,9 @@ def test_the_trace_is_sound(name, chip, wanted):
     np.testing.assert_allclose(floats(rows["slave_x"])[:, :2], mean, rtol=1e-4, atol=1e-2)
 
 
-@pytest.mark.parametrize("chip", [False, True])
-@pytest.mark.parametrize("name", [name for name in RECORDS if name not in PAPER])
+@pytest.mark.parametrize(("name", "chip"), MEETING)
 def test_the_encounter_is_followed(name, chip, wanted):
     """Slave and masters are found where they are, but for what the filter itself deems unlikely."""
-    if chip and name not in ON_CHIP:
-        pytest.skip("does not fit into the chip")
     record = (ON_CHIP if chip else RECORDS)[name]
     last = wanted(name, chip=chip)[-1]
     end_s = float(len(record.world.steps))
