@@ -295,18 +295,6 @@ class _NoiseDict(TypedDict):
     centred: bool
     dropout: float
 
-class _ScenarioDict(TypedDict):
-    track: Track
-    noise: SensorNoise
-    seed: int
-    first_run: int
-    runs: int
-    steps: int
-    duration_s: float
-    random_start: bool
-    probe_period_s: float
-    budget_m: float
-
 class Track(metaclass=_Type):
     def __init__(
         self,
@@ -327,7 +315,7 @@ def simulate_tracking(
     x0: _F32 | _F64,
     P0: _F32 | _F64,
     sensor: _Sensor[Any],
-    scenario: _ScenarioDict,
+    scenario: Mapping[str, Any],
 ) -> dict[str, npt.NDArray[Any]]: ...
 
 class SensorNoise(metaclass=_Type):

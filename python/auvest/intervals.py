@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from auvest import _core
 from auvest._arguments import as_kind, as_number, require_range
+from auvest._fields import Checked, positive
 
 if TYPE_CHECKING:
     from auvest._core import _Interval
@@ -17,7 +18,7 @@ _LAW = {name: _core.mahalanobis_interval_defaults(name) for name in ("figure3", 
 
 
 @dataclass(frozen=True, kw_only=True)
-class FixedInterval:
+class FixedInterval(Checked):
     """A constant sampling interval: with it an AUKF is a UKF.
 
     Parameters
@@ -26,14 +27,11 @@ class FixedInterval:
         Interval in seconds, positive.
     """
 
-    interval_s: float = _FIXED["interval_s"]
-
-    def __post_init__(self) -> None:
-        _set_positive(self, "interval_s")
+    interval_s: float = positive(_FIXED["interval_s"])
 
 
 @dataclass(frozen=True, kw_only=True)
-class CovarianceBudget:
+class CovarianceBudget(Checked):
     """The largest interval after which the predicted position is still within an error budget.
 
     Not in the paper. It needs no reference track.
@@ -48,13 +46,13 @@ class CovarianceBudget:
         Interval before the first update, s.
     """
 
-    position_sigma_m: float = _BUDGET["position_sigma_m"]
-    min_s: float = _BUDGET["min_s"]
-    max_s: float = _BUDGET["max_s"]
-    initial_s: float = _BUDGET["initial_s"]
+    position_sigma_m: float = positive(_BUDGET["position_sigma_m"])
+    min_s: float = positive(_BUDGET["min_s"])
+    max_s: float = positive(_BUDGET["max_s"])
+    initial_s: float = positive(_BUDGET["initial_s"])
 
     def __post_init__(self) -> None:
-        _set_positive(self, "position_sigma_m", "min_s", "max_s", "initial_s")
+        super().__post_init__()
         _check_limits(self)
 
 

@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from auvest import _core
-from auvest._arguments import as_array, as_integer, as_kind, as_number, require_range
+from auvest._arguments import as_array, as_kind, as_number, require_range
+from auvest._fields import Checked, integer
 
 if TYPE_CHECKING:
     from auvest._core import _Kernel
@@ -118,7 +119,7 @@ class Igg(Kernel):
 
 
 @dataclass(frozen=True, kw_only=True)
-class RejectionStreak:
+class RejectionStreak(Checked):
     """Recovery from lock-out: a streak of rejections widens the position's covariance.
 
     A rejection counts 4 up, or 7 if it repeats the innovation of a recent one seen along the same
@@ -131,10 +132,7 @@ class RejectionStreak:
         Rejections in a row that it takes if none repeats another, 1..60.
     """
 
-    rejections: int = _REJECTIONS
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "rejections", as_integer("rejections", self.rejections, 1, 60))
+    rejections: int = integer(_REJECTIONS, 1, 60)
 
 
 KernelName: TypeAlias = Literal["igg", "huber", "hampel", "unit"]

@@ -10,14 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from auvest import _core
-from auvest._arguments import (
-    Bound,
-    DType,
-    Floats,
-    as_array,
-    as_number,
-    require_range,
-)
+from auvest._arguments import DType, Floats, as_array, as_number, require_range
+from auvest._fields import Checked
 from auvest._state import describe
 
 if TYPE_CHECKING:
@@ -26,7 +20,7 @@ if TYPE_CHECKING:
 _FLOAT64 = np.dtype(np.float64)
 
 
-class Model:
+class Model(Checked):
     """A frozen dataclass of parameters that knows its counterpart in the core.
 
     Handles on the core are made when they are first needed and stay with the model; they are no
@@ -77,10 +71,6 @@ class Model:
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in self.__dict__.items() if name != "_handles"}
-
-    def _set_numbers(self, bound: Bound, *names: str) -> None:
-        for name in names:
-            object.__setattr__(self, name, as_number(name, getattr(self, name), bound))
 
 
 #: Begins what is kept instead of a description where a model cannot be described.
