@@ -25,7 +25,7 @@ import tarfile
 import tokenize
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path, PurePosixPath
 
@@ -69,7 +69,8 @@ class Rules:
     Attributes
     ----------
     new : mapping of str to str
-        Why a file is a new capability, or a definition in one: ``path::Class.name``, Python only.
+        Why a file is a new capability, or a definition in one: ``path::Class.name`` in Python,
+        ``path::name`` in C++: all functions or classes of that name.
     moved : mapping of str to str
         Where a file of before belongs now: a folder.
     roles : mapping of str to sequence of str
@@ -107,7 +108,7 @@ class Rules:
         for pattern in self.new:
             path, _, definition = pattern.partition("::")
             if fnmatchcase(name, path):
-                new += definition_lines(source, definition) if definition else lines
+                new += definition_lines(path, source, definition) if definition else lines
         return lines - new, new
 
 
@@ -116,24 +117,51 @@ def python_lines(source: str) -> int:
     return len(_python_code(source))
 
 
-def definition_lines(source: str, name: str) -> int:
-    """Count the lines of code of a function or class of a Python module, ``Class.name`` if inside.
+def definition_lines(path: str, source: str, name: str) -> int:
+    """Count the lines of code of a definition in a file.
 
     Raises
     ------
     LookupError
         If there is none of that name.
     """
+    find = _python_definition if path.endswith(PYTHON) else _cxx_definitions
+    lines = find(source, name)
+    if not lines:
+        raise LookupError(f"{path}: there is no {name}")
+    return len(lines)
+
+
+def _python_definition(source: str, name: str) -> set[int]:
     body: list[ast.stmt] = ast.parse(source).body
+    lines = range(0)
     for part in name.split("."):
         found = [node for node in body if getattr(node, "name", None) == part]
         if not found:
-            raise LookupError(f"there is no {name}")
+            return set()
         node = found[0]
         assert isinstance(node, ast.FunctionDef | ast.ClassDef)
+        first = min([node.lineno, *(decorator.lineno for decorator in node.decorator_list)])
+        lines = range(first, (node.end_lineno or first) + 1)
         body = node.body
-    first = min([node.lineno, *(decorator.lineno for decorator in node.decorator_list)])
-    return len(_python_code(source) & set(range(first, (node.end_lineno or first) + 1)))
+    return _python_code(source) & set(lines)
+
+
+def _cxx_definitions(source: str, name: str) -> set[int]:
+    """Find definitions: from the end of what stands before to the bracket that closes the body."""
+    text = _without_comments(source)
+    lines: set[int] = set()
+    for found in re.finditer(rf"\b{name}\b(?=\(| (?::|\{{))[^;{{]*\{{", text):
+        start = max(text.rfind(end, 0, found.start()) for end in ";{}:")
+        stop, depth = found.end(), 1
+        while depth:
+            depth += {"{": 1, "}": -1}.get(text[stop], 0)
+            stop += 1
+        first = text.count("\n", 0, start) + 1
+        for number, line in enumerate(text[start + 1 : stop].split("\n")):
+            if line.strip():
+                lines.add(first + number)
+    return lines
 
 
 def _python_code(source: str) -> set[int]:
@@ -154,11 +182,14 @@ def _python_code(source: str) -> set[int]:
 
 def cxx_lines(source: str) -> int:
     """Count the lines of code of a C++ file."""
+    return sum(bool(line.strip()) for line in _without_comments(source).split("\n"))
 
+
+def _without_comments(source: str) -> str:
     def blank(found: re.Match[str]) -> str:
         return re.sub(r"[^\n]", " ", found[0]) if found["comment"] else found[0]
 
-    return sum(bool(line.strip()) for line in _CXX.sub(blank, source).split("\n"))
+    return _CXX.sub(blank, source)
 
 
 def count(name: str, source: str) -> int | None:
@@ -253,7 +284,7 @@ def main(
     if given.base is None:
         print(table("folder", {"lines": now + new}))
         return
-    before, _ = by_folder(revision(root, given.base), below, said)
+    before, _ = by_folder(revision(root, given.base), below, replace(said, new={}))
     columns = {"before": before, "now": now, "new": new}
     print(table("folder", columns))
     print()

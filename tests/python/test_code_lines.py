@@ -93,12 +93,41 @@ filters = ["python/*"]
 
 def test_a_definition_counts_with_its_decorators_and_without_its_docstring():
     source = 'a = 1\n\n\n@b\ndef f(\n    x,\n):\n    """Doc."""\n\n    return x\n\n\nc = 2\n'
-    assert code_lines.definition_lines(source, "f") == 5
+    assert code_lines.definition_lines("a.py", source, "f") == 5
     inside = "class C:\n    a = 1\n\n    def f(self):\n        return 1\n\n    def g(self): ...\n"
-    assert code_lines.definition_lines(inside, "C.f") == 2
-    assert code_lines.definition_lines(inside, "C") == 5
+    assert code_lines.definition_lines("a.py", inside, "C.f") == 2
+    assert code_lines.definition_lines("a.py", inside, "C") == 5
     with pytest.raises(LookupError, match=r"C\.h"):
-        code_lines.definition_lines(inside, "C.h")
+        code_lines.definition_lines("a.py", inside, "C.h")
+
+
+CLASSES = """\
+class A : public B {  // 1
+ public:
+  // about f
+  template <class T>  // 3
+  void f(T x) const {  // 4
+
+    if (x) { g(x); }  // 5
+  }  // 6
+  void f();
+  int h() { return f(1) + f(2); }
+};
+
+struct C {  // 1
+  int f(
+      int a  // a comment with { in it
+  ) { return a; }
+};
+"""
+
+
+def test_definitions_in_cxx_count_from_their_template_to_their_last_bracket():
+    assert code_lines.definition_lines("a.hpp", CLASSES, "f") == 4 + 3
+    assert code_lines.definition_lines("a.hpp", CLASSES, "h") == 1
+    assert code_lines.definition_lines("a.hpp", CLASSES, "C") == 5
+    with pytest.raises(LookupError, match=r"a\.hpp: there is no g"):
+        code_lines.definition_lines("a.hpp", CLASSES, "g")
 
 
 @pytest.fixture
@@ -117,6 +146,7 @@ def repository(tmp_path):
             "cpp/a.hpp": "int a;\nint b;\n",
             "python/old/a.py": "a = 1\n",
             "python/old/b.py": "b = 1\nc = 1\n",
+            "python/x/a.py": "class C: ...\n",  # has no method yet
             "python/x/b.md": "c\n",
             ".gitignore": "ignored.py\n",
         }
@@ -148,13 +178,13 @@ def test_what_existed_before_is_compared_where_it_is_now(repository, rules, caps
     assert [line.split() for line in capsys.readouterr().out.splitlines()] == [
         ["folder", "before", "now", "change", "new"],
         ["cpp", "2", "0", "-2", "0"],
-        ["python/x", "3", "2", "-1", "3"],  # one line of new.py and two of the method are new
-        ["all", "5", "2", "-3", "3"],
+        ["python/x", "4", "2", "-2", "3"],  # one line of new.py and two of the method are new
+        ["all", "6", "2", "-4", "3"],
         [],
         ["role", "before", "now", "change", "new"],
-        ["filters", "3", "2", "-1", "3"],
+        ["filters", "4", "2", "-2", "3"],
         ["rest", "2", "0", "-2", "0"],
-        ["all", "5", "2", "-3", "3"],
+        ["all", "6", "2", "-4", "3"],
     ]
 
 
@@ -175,7 +205,7 @@ def test_the_rules_name_files_and_definitions_that_are_there():
         found = [name for name in files if fnmatchcase(name, path)]
         assert found, pattern
         if definition:
-            assert code_lines.definition_lines(files[found[0]], definition) > 0, pattern
+            assert code_lines.definition_lines(found[0], files[found[0]], definition) > 0, pattern
     folders = {rules.folder(name) for name in files}
     for role, patterns in rules.roles.items():
         for pattern in patterns:
