@@ -96,8 +96,7 @@ def weights(result: Result) -> Figure:
         doubted["time_s"][away], np.zeros(int(away.sum())), "x", color=plots.VERMILION,
         markersize=6, label=tables.REJECTED,
     )  # fmt: skip
-    axes.set(xlabel="time / s", ylabel="weight", ylim=(-0.05, 1.08))
-    plots.style(axes)
+    plots.style(axes, xlabel="time / s", ylabel="weight", ylim=(-0.05, 1.08))
     _legend(axes)
     return figure
 
@@ -108,8 +107,7 @@ def held_out(result: Result) -> Figure:
     axes = figure.add_subplot()
     rows = result.measurements.columns()
     axes.plot(rows["time_s"], rows["held_out_error_m"], ".", color=plots.BLUE, markersize=3)
-    axes.set(xlabel="time / s", ylabel="error / m")
-    plots.style(axes)
+    plots.style(axes, xlabel="time / s", ylabel="error / m")
     return figure
 
 
@@ -124,9 +122,7 @@ def _tracks(axes: Axes, result: Result) -> None:
     axes.plot(*estimated, "-", color=plots.BLUE, linewidth=1.2, label="estimate")
     if len(result.sources):
         axes.plot(*result.sources.T, "^", color=plots.GREEN, linestyle="none", label="beacons")
-    axes.set(xlabel="x / m", ylabel="y / m")
-    axes.set_aspect("equal", adjustable="datalim")
-    plots.style(axes)
+    plots.style_plane(axes)
     _legend(axes)
 
 
@@ -140,8 +136,7 @@ def _errors(pair: tuple[Axes, Axes], result: Result) -> None:
         )  # fmt: skip
         axes.plot(rows["time_s"], rows[f"error_{name}_m"], color=plots.BLUE, linewidth=1.0,
                   label="error")  # fmt: skip
-        axes.set_ylabel(f"{name} error / m")
-        plots.style(axes)
+        plots.style(axes, ylabel=f"{name} error / m")
     _legend(pair[0])
     pair[1].set_xlabel("time / s")
 
@@ -162,9 +157,8 @@ def _innovation(axes: Axes, result: Result, m: int) -> None:
     if away.any():
         rejected = doubted["time_s"][away], doubted[f"innovation_{m}"][away]
         axes.plot(*rejected, "x", color=plots.VERMILION, markersize=5, label=tables.REJECTED)
-    axes.set_ylabel(("range / m", "bearing / rad")[m])
     _compress(axes, value, 4 * float(np.quantile(bound, 0.9)) if len(bound) else 1.0)
-    plots.style(axes)
+    plots.style(axes, ylabel=("range / m", "bearing / rad")[m])
     _legend(axes)
 
 
@@ -176,10 +170,8 @@ def _nis(axes: Axes, result: Result) -> None:
     axes.axhline(high, color=plots.BLACK, linewidth=0.9, linestyle="--",
                  label=f"95 % below {high:.2f}")  # fmt: skip
     _compress(axes, rows["nis"], 2 * high)
-    axes.set_ylabel("NIS")
     axes.margins(y=0.1)
-    axes.set_ylim(bottom=0.0)
-    plots.style(axes)
+    plots.style(axes, ylabel="NIS", ylim=(0.0, None))
     _legend(axes)
 
 
