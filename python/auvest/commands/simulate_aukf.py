@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 import typer
@@ -34,7 +34,6 @@ from auvest import (
 )
 from auvest.commands import options
 from auvest.commands.console import Terminal, table
-from auvest.commands.files import write_csv
 from auvest.commands.options import (
     FILTER,
     MONTE_CARLO,
@@ -49,12 +48,16 @@ from auvest.commands.options import (
 from auvest.commands.session import Floats, Session, failure
 from auvest.intervals import IntervalPolicy
 from auvest.scenarios import paper_aukf
+from auvest.scenarios._runs import standard_error
 from auvest.scenarios.paper_aukf import (
     FilterName,
     TrackName,
     observed_positions,
 )
 from auvest.scenarios.tracking import Scenario, TrackingResult, sensor_of, simulate
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _INTERVAL = "Sampling interval"
 
@@ -194,20 +197,13 @@ def command(
     }
     session = Session(terminal, output, "simulate aukf", settings)
     result = session.run(simulate, filter_, scenario, workers=workers)
-    if result is None:
-        session.nothing_done()
     values = measures(result)
     per_step = means_per_step(result)
-    with terminal.writing(output):
-        files = {
-            "per_step": write_csv(output / "per_step.csv", per_step),
-            "one_run": write_csv(output / "one_run.csv", one_run(result, sensor_of(filter_))),
-        }
-        if not no_figure:
-            files["figure"] = _draw(
-                output / "figure.png", result, sensor_of(filter_), filter_name, policy
-            )
-    session.report(values, files, _table(values, settings), per_step=per_step)
+    session.write_csv("per_step", per_step)
+    session.write_csv("one_run", one_run(result, sensor_of(filter_)))
+    if not no_figure:
+        session.draw(_figure, result, sensor_of(filter_), filter_name, policy)
+    session.report(values, _table(values, settings), per_step=per_step)
     kept = f"{values['runs']} of {runs} runs are done and kept"
     session.end(kept, failure(result))
 
@@ -256,7 +252,6 @@ def measures(result: TrackingResult) -> dict[str, Any]:
     seen = np.isfinite(square).any(axis=1)
     per_run = np.nanmean(square[seen], axis=1)
     rmse = result.rmse_m
-    spread = float(per_run.std(ddof=1) / np.sqrt(len(per_run))) if len(per_run) > 1 else np.nan
     nis = result.nis[np.isfinite(result.nis)]
     nis_bounds = metrics.chi2_bounds(2, nis.size) if nis.size else (np.nan, np.nan)
     nees = result.nees
@@ -269,7 +264,7 @@ def measures(result: TrackingResult) -> dict[str, Any]:
         "failed_runs": int(result.failed.sum()),
         "samples": int(result.samples.sum()),
         "rmse_m": rmse,
-        "rmse_standard_error_m": spread / (2 * rmse) if rmse > 0 else np.nan,
+        "rmse_standard_error_m": standard_error(per_run) / (2 * rmse) if rmse > 0 else np.nan,
         "rmse_x_m": metrics.rmse(result.error[..., :1]),
         "rmse_y_m": metrics.rmse(result.error[..., 1:]),
         "mean_interval_s": interval,
@@ -330,13 +325,9 @@ def _mean(values: Floats) -> float:
     return float(known.mean()) if known.size else float("nan")
 
 
-def _draw(
-    path: Path,
-    result: TrackingResult,
-    sensor: RangeBearing,
-    name: str,
-    policy: IntervalPolicy,
-) -> Path:
+def _figure(
+    result: TrackingResult, sensor: RangeBearing, name: str, policy: IntervalPolicy
+) -> Figure:
     from auvest import plots  # here, because matplotlib takes long to import
 
     colour = plots.FILTER_COLOURS[name]
@@ -351,7 +342,7 @@ def _draw(
         pace.append(plots.Line("fixed, Table 1", fixed, colour=plots.BLACK, style="--"))
     sigma = np.sqrt(np.diagonal(result.position_covariance[0], axis1=-2, axis2=-1))
     noise = result.scenario.noise
-    figure = plots.simulation_figure(
+    return plots.simulation_figure(
         result.truth[0],
         result.x[0, :, :2],
         observed_positions(result.z[0], sensor.station),
@@ -365,7 +356,6 @@ def _draw(
         label=f"{name.upper()} estimate",
         colour=colour,
     )
-    return plots.save(figure, path)
 
 
 def _table(values: dict[str, Any], settings: dict[str, Any]) -> Table:

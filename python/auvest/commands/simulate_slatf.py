@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -28,7 +28,6 @@ from rich.table import Table
 from auvest import metrics, montecarlo
 from auvest.commands import console, options
 from auvest.commands.console import Terminal
-from auvest.commands.files import write_csv
 from auvest.commands.options import (
     FILTER,
     WORLD,
@@ -54,6 +53,9 @@ from auvest.slat import (
     SlatFilter,
     SlatfJoint,
 )
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 FilterOption = Literal["slatf1", "slatf2", "slatf-joint", "ekf-slat", "dead-reckoning"]
 _PARTICLE_FILTERS: tuple[FilterOption, ...] = ("slatf1", "slatf2", "slatf-joint")
@@ -179,28 +181,21 @@ def command(
     }
     session = Session(terminal, output, "simulate slatf", settings)
     store = output / ".runs"
+    identity = _identity(settings)
     with terminal.writing(output):
         result = session.run(
-            simulate,
-            filter_,
-            scenario,
-            workers=workers,
-            store=store,
-            settings=_identity(settings),
+            simulate, filter_, scenario, workers=workers, store=store, settings=identity
         )
-    if result is None:
-        session.nothing_done()
     values = measures(result)
     per_ping = means_per_ping(result)
-    with terminal.writing(output):
-        files = {
-            "per_ping": write_csv(output / "per_ping.csv", per_ping),
-            "runs": montecarlo.write_table(output / f"runs.{table}", per_run(result)),
-        }
-        if not no_figure:
-            files["figure"] = _draw(output / "figure.png", result, _TITLES[filter_name])
     title = _TITLES[filter_name]
-    session.report(values, files, _table(values, scenario, title), per_ping=per_ping)
+    session.write_csv("per_ping", per_ping)
+    with terminal.writing(output):
+        path = output / f"runs.{table}"
+        session.files["runs"] = montecarlo.write_table(path, per_run(result))
+    if not no_figure:
+        session.draw(_figure, result, title)
+    session.report(values, _table(values, scenario, title), per_ping=per_ping)
     kept = f"{values['runs']} of {runs} runs are done and kept; the same command goes on from there"
     if not session.interrupted:
         montecarlo.discard(store)
@@ -286,23 +281,20 @@ def per_run(result: SlatResult) -> dict[str, npt.NDArray[Any]]:
     }
 
 
-def _draw(path: Path, result: SlatResult, title: str) -> Path:
+def _figure(result: SlatResult, title: str) -> Figure:
     from auvest import plots  # here, because matplotlib takes long to import
 
     scenario = result.scenario
     name = f"{title}: RMSE {result.rmse_m:.3g} m, {scenario.sigma_range_m:g} m"
-    return plots.save(
-        plots.slave_figure(
-            result.truth,
-            result.truth + result.error[0],
-            result.masters,
-            time_s=result.time_s,
-            error_m=result.distance_m[0],
-            sigma_m=np.sqrt(np.trace(result.covariance[0], axis1=-2, axis2=-1)),
-            rms_m=means_per_ping(result)["rms_error_m"],
-            title=f"{name}, {scenario.sigma_bearing_rad:g} rad",
-        ),
-        path,
+    return plots.slave_figure(
+        result.truth,
+        result.truth + result.error[0],
+        result.masters,
+        time_s=result.time_s,
+        error_m=result.distance_m[0],
+        sigma_m=np.sqrt(np.trace(result.covariance[0], axis1=-2, axis2=-1)),
+        rms_m=means_per_ping(result)["rms_error_m"],
+        title=f"{name}, {scenario.sigma_bearing_rad:g} rad",
     )
 
 
