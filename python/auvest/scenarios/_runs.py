@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from auvest import metrics, montecarlo
+from auvest._arguments import Floats
 from auvest._core import Status
 from auvest.filters import GaussianFilter
 from auvest.models import MeasurementModel
@@ -71,7 +72,7 @@ def only_sensor(
     return sensors[0]
 
 
-def standard_error(per_run: npt.NDArray[np.float64]) -> float:
+def standard_error(per_run: Floats) -> float:
     """Give the standard error of the mean of a number per run; NaN for one run."""
     if len(per_run) < 2:
         return math.nan

@@ -7,6 +7,7 @@ are the numbers of the figures. The page that judges the paper's claims is made 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -17,6 +18,7 @@ from auvest import Aukf, FixedInterval, MahalanobisInterval
 from auvest.intervals import IntervalPolicy
 from auvest.reproduce.estimate import Estimate, Floats
 from auvest.reproduce.ticks import Ticks
+from auvest.scenarios._runs import standard_error
 from auvest.scenarios.paper_aukf import (
     ASSUMPTIONS,
     FIXED_INTERVAL_S,
@@ -263,10 +265,7 @@ def collapsed(pace: Floats) -> float:
 def rms(square: Floats) -> Estimate:
     """Root of a mean of squares, and its standard error, from one mean square per run."""
     value = float(np.sqrt(square.mean()))
-    if len(square) < 2 or value == 0:
-        return Estimate(value, float("nan"))
-    spread = float(square.std(ddof=1) / np.sqrt(len(square)))
-    return Estimate(value, spread / (2 * value))
+    return Estimate(value, standard_error(square) / (2 * value) if value else math.nan)
 
 
 def square_per_run(result: TrackingResult, axis: int | None = None) -> Floats:
@@ -302,10 +301,7 @@ def excess_over_time(a: TrackingResult, b: TrackingResult) -> Estimate:
 
 def _excess(square_a: Floats, square_b: Floats) -> Estimate:
     ratio = float(np.sqrt(square_a.mean() / square_b.mean()))
-    if len(square_a) < 2:
-        return Estimate(ratio - 1, float("nan"))
-    residual = square_a - ratio**2 * square_b
-    spread = float(residual.std(ddof=1) / np.sqrt(len(residual)) / square_b.mean())
+    spread = standard_error(square_a - ratio**2 * square_b) / float(square_b.mean())
     return Estimate(ratio - 1, spread / (2 * ratio))
 
 

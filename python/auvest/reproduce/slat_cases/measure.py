@@ -24,6 +24,7 @@ from auvest import (
     SlatfJoint,
 )
 from auvest._arguments import Floats
+from auvest.scenarios._runs import standard_error
 from auvest.scenarios.paper_slatf import LEVELS, PARTICLES, paper_scenario
 from auvest.scenarios.slat import SlatResult, SlatScenario, Vehicle, simulate
 from auvest.slat import SlatFilter
@@ -339,8 +340,7 @@ def _rmse(error: Floats) -> Floats:
 
 
 def _mean(per_run: Floats) -> dict[str, float]:
-    error = per_run.std(ddof=1) / math.sqrt(len(per_run))
-    return {"mean": float(per_run.mean()), "standard_error": float(error)}
+    return {"mean": float(per_run.mean()), "standard_error": standard_error(per_run)}
 
 
 # ---- The page ------------------------------------------------------------------------------------
