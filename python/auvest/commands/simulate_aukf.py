@@ -25,13 +25,7 @@ import numpy as np
 import typer
 from rich.table import Table
 
-from auvest import (
-    CovarianceBudget,
-    FixedInterval,
-    MahalanobisInterval,
-    RangeBearing,
-    metrics,
-)
+from auvest import CovarianceBudget, FixedInterval, MahalanobisInterval, RangeBearing, metrics
 from auvest.commands import options
 from auvest.commands.console import Terminal, table
 from auvest.commands.options import (
@@ -49,11 +43,7 @@ from auvest.commands.session import Floats, Session, failure
 from auvest.intervals import IntervalPolicy
 from auvest.scenarios import paper_aukf
 from auvest.scenarios._runs import standard_error
-from auvest.scenarios.paper_aukf import (
-    FilterName,
-    TrackName,
-    observed_positions,
-)
+from auvest.scenarios.paper_aukf import FilterName, TrackName, observed_positions
 from auvest.scenarios.tracking import Scenario, TrackingResult, sensor_of, simulate
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ Examples
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -39,32 +39,22 @@ from auvest.commands.options import (
 )
 from auvest.commands.session import Floats, Session, failure, mean_over_runs
 from auvest.commands.version import version
-from auvest.scenarios.paper_aukf import DTypeName
-from auvest.scenarios.paper_slatf import LEVELS, PARTICLES, RUNS
+from auvest.scenarios.paper_slatf import LEVELS, PARTICLES, RUNS, FilterName, paper_filter
 from auvest.scenarios.slat import SlatResult, SlatScenario, paper_masters, simulate
-from auvest.slat import (
-    MAX_MASTERS,
-    DeadReckoning,
-    EkfSlat,
-    Lanes,
-    ParticleSlatFilter,
-    Resampling,
-    Slatf,
-    SlatFilter,
-    SlatfJoint,
-)
+from auvest.slat import MAX_MASTERS, Lanes, ParticleSlatFilter, Resampling, Slatf
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FilterOption = Literal["slatf1", "slatf2", "slatf-joint", "ekf-slat", "dead-reckoning"]
 _PARTICLE_FILTERS: tuple[FilterOption, ...] = ("slatf1", "slatf2", "slatf-joint")
-_TITLES: dict[FilterOption, str] = {
-    "slatf1": "SLATF 1.0",
-    "slatf2": "SLATF 2.0",
-    "slatf-joint": "SLATF, joint",
-    "ekf-slat": "EKF-SLAT",
-    "dead-reckoning": "dead reckoning",
+#: Names in the paper's scenario, and titles.
+_FILTERS: dict[FilterOption, tuple[FilterName, str]] = {
+    "slatf1": ("slatf1", "SLATF 1.0"),
+    "slatf2": ("slatf2", "SLATF 2.0"),
+    "slatf-joint": ("slatf_joint", "SLATF, joint"),
+    "ekf-slat": ("ekf_slat", "EKF-SLAT"),
+    "dead-reckoning": ("dr_compensated", "dead reckoning"),
 }
 
 
@@ -142,6 +132,7 @@ def command(
         refuse_given(ctx, ("lanes",), "belongs to slatf1 and slatf2.")
     if filter_name == "dead-reckoning":
         refuse_given(ctx, ("gate",), "does nothing: dead reckoning hears no echo.")
+    name, title = _FILTERS[filter_name]
     noise = LEVELS[level - 1]
     with terminal.usage_errors():
         scenario = SlatScenario(
@@ -156,15 +147,18 @@ def command(
             runs=runs,
             seed=seed,
         )
-        filter_ = _filter(
-            filter_name,
+        hearing: dict[str, Any] = {"gate": gate}
+        if filter_name in _PARTICLE_FILTERS:
+            hearing["resampling"] = resampling
+        if filter_name in ("slatf1", "slatf2"):
+            hearing["lanes"] = lanes
+        filter_ = paper_filter(
+            name,
             scenario,
-            compensate_bias=heading_bias == "compensate",
-            gate=gate,
             particles=particles,
-            resampling=resampling,
-            lanes=lanes,
+            compensate_bias=heading_bias == "compensate",
             dtype=dtype,
+            **hearing,
         )
     settings = {
         "filter": filter_name,
@@ -188,7 +182,6 @@ def command(
         )
     values = measures(result)
     per_ping = means_per_ping(result)
-    title = _TITLES[filter_name]
     session.write_csv("per_ping", per_ping)
     with terminal.writing(output):
         path = output / f"runs.{table}"
@@ -200,34 +193,6 @@ def command(
     if not session.interrupted:
         montecarlo.discard(store)
     session.end(kept, failure(result))
-
-
-def _filter(
-    name: FilterOption,
-    scenario: SlatScenario,
-    *,
-    compensate_bias: bool,
-    gate: float,
-    particles: int,
-    resampling: Resampling,
-    lanes: Lanes | None,
-    dtype: DTypeName,
-) -> SlatFilter:
-    x0 = np.array([scenario.slave.x_m, scenario.slave.y_m])
-    P0 = np.zeros((2, 2))
-    options: dict[str, Any] = {
-        "motion": replace(scenario.motion, compensate_bias=compensate_bias),
-        "dtype": dtype,
-    }
-    if name == "dead-reckoning":
-        return DeadReckoning(x0, P0, **options)
-    options.update(sonar=scenario.sonar, gate=gate)
-    if name == "ekf-slat":
-        return EkfSlat(x0, P0, **options)
-    options.update(particles=particles, resampling=resampling)
-    if name == "slatf-joint":
-        return SlatfJoint(x0, P0, max_masters=len(scenario.masters), **options)
-    return Slatf(x0, P0, version=1 if name == "slatf1" else 2, lanes=lanes, **options)
 
 
 def _identity(settings: dict[str, Any]) -> dict[str, Any]:

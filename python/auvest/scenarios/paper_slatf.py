@@ -8,7 +8,7 @@ configuration R1 of docs/algorithms/slatf.md.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -78,9 +78,9 @@ def paper_filter(
     *,
     particles: int = PARTICLES,
     compensate_bias: bool = True,
-    carry_covariance: bool = False,
     acceleration_m_s2: float = PiecewiseAcceleration().acceleration_m_s2,
     dtype: DTypeName = "float64",
+    **options: Any,
 ) -> SlatFilter:
     """Set up a filter as the scenario needs it: it knows the noise of all sensors.
 
@@ -92,12 +92,12 @@ def paper_filter(
         Of SLATF 1.0, 2.0 and joint.
     compensate_bias : bool
         Make up for the bias of the heading's noise, except in "dr".
-    carry_covariance : bool
-        Eq. (50) to the letter, in "slatf2".
     acceleration_m_s2 : float
         q of the master's model.
     dtype : {"float64", "float32"}
         Precision.
+    **options
+        Of the filter that hears echoes, beside its models.
     """
     x0 = np.array([scenario.slave.x_m, scenario.slave.y_m])
     P0 = np.zeros((2, 2))
@@ -105,29 +105,13 @@ def paper_filter(
     if name in ("dr", "dr_compensated"):
         return DeadReckoning(x0, P0, motion=motion, dtype=dtype)
     master = PiecewiseAcceleration(acceleration_m_s2=acceleration_m_s2)
+    options.update(motion=motion, master=master, sonar=scenario.sonar, dtype=dtype)
     if name == "ekf_slat":
-        return EkfSlat(x0, P0, motion=motion, master=master, sonar=scenario.sonar, dtype=dtype)
+        return EkfSlat(x0, P0, **options)
     if name == "slatf_joint":
-        return SlatfJoint(
-            x0,
-            P0,
-            particles=particles,
-            motion=motion,
-            master=master,
-            sonar=scenario.sonar,
-            dtype=dtype,
-        )
-    return Slatf(
-        x0,
-        P0,
-        version=1 if name == "slatf1" else 2,
-        particles=particles,
-        motion=motion,
-        master=master,
-        sonar=scenario.sonar,
-        carry_covariance=carry_covariance,
-        dtype=dtype,
-    )
+        masters = len(scenario.masters)
+        return SlatfJoint(x0, P0, particles=particles, max_masters=masters, **options)
+    return Slatf(x0, P0, particles=particles, version=1 if name == "slatf1" else 2, **options)
 
 
 _R1 = SlatScenario()
