@@ -94,8 +94,7 @@ def step_figure(
     lines: Sequence[Line], *, title: str, ylabel: str, xlabel: str = "step", zero: bool = False
 ) -> Figure:
     """Draw curves over the step number, or over ``Line.x`` where a line has one."""
-    figure = new_figure((6.6, 4.4), title)
-    axes = figure.add_subplot()
+    figure, axes = new_axes((6.6, 4.4), title)
     _draw_lines(axes, lines)
     if zero:
         axes.axhline(0.0, color=BLACK, linewidth=0.6, zorder=1)
@@ -301,6 +300,12 @@ def new_figure(size: tuple[float, float], title: str) -> Figure:
     figure = Figure(figsize=size, dpi=DPI, layout="constrained")
     figure.suptitle(title, fontsize=12)
     return figure
+
+
+def new_axes(size: tuple[float, float], title: str) -> tuple[Figure, Axes]:
+    """Make a figure of that size in inches with axes in it."""
+    figure = new_figure(size, title)
+    return figure, figure.add_subplot()
 
 
 def style(axes: Axes, *, title: str = "", legend: float | None = None, **labels: Any) -> None:

@@ -16,7 +16,7 @@ Examples
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -53,6 +53,13 @@ _INTERVAL = "Sampling interval"
 
 _NOISE = paper_aukf.paper_noise()
 _LAW = MahalanobisInterval()
+
+#: The interval policies, and which parameter of each an option is.
+_POLICIES: dict[str, tuple[Callable[..., IntervalPolicy], dict[str, str]]] = {
+    "fixed": (FixedInterval, {"fixed_interval": "interval_s"}),
+    "covariance-budget": (CovarianceBudget, {"budget": "position_sigma_m"}),
+    "mahalanobis": (MahalanobisInterval, {"preset": "preset", "tau0": "tau0"}),
+}
 
 
 def command(
@@ -145,9 +152,8 @@ def command(
         refuse_given(
             ctx, ("alpha", "beta", "kappa"), "belongs to --filter ukf or aukf, not to ekf."
         )
-    policy = _interval_policy(
-        filter_name, interval, preset=preset, tau0=tau0, fixed=fixed_interval, budget=budget
-    )
+    given = {"preset": preset, "tau0": tau0, "fixed_interval": fixed_interval, "budget": budget}
+    policy = _interval_policy(ctx, filter_name, interval, given)
     world = paper_aukf.paper_noise(
         noise,
         range_m=range_noise,
@@ -199,13 +205,7 @@ def command(
 
 
 def _interval_policy(
-    filter_name: str,
-    interval: str | None,
-    *,
-    preset: Literal["figure3", "table1"] | None,
-    tau0: float | None,
-    fixed: float | None,
-    budget: float | None,
+    ctx: typer.Context, filter_name: str, interval: str | None, given: Mapping[str, object]
 ) -> IntervalPolicy:
     """Build the policy that the options ask for; options of another policy are refused."""
     kind = interval or ("mahalanobis" if filter_name == "aukf" else "fixed")
@@ -214,23 +214,12 @@ def _interval_policy(
             f"'{kind}' needs --filter aukf; {filter_name} samples at a fixed interval.",
             param_hint="'--interval'",
         )
-    policies: dict[str, tuple[Callable[..., IntervalPolicy], dict[str, tuple[str, object]]]] = {
-        "fixed": (FixedInterval, {"--fixed-interval": ("interval_s", fixed)}),
-        "covariance-budget": (CovarianceBudget, {"--budget": ("position_sigma_m", budget)}),
-        "mahalanobis": (
-            MahalanobisInterval,
-            {"--preset": ("preset", preset), "--tau0": ("tau0", tau0)},
-        ),
-    }
-    for owner, (_, owned) in policies.items():
-        for name, (_, value) in owned.items():
-            if value is not None and owner != kind:
-                raise typer.BadParameter(
-                    f"belongs to --interval {owner}, not to {kind}.", param_hint=f"'{name}'"
-                )
-    make, given = policies[kind]
+    for owner, (_, owned) in _POLICIES.items():
+        if owner != kind:
+            refuse_given(ctx, tuple(owned), f"belongs to --interval {owner}, not to {kind}.")
+    make, names = _POLICIES[kind]
     try:
-        return make(**{name: value for name, value in given.values() if value is not None})
+        return make(**{names[name]: given[name] for name in names if given[name] is not None})
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint=f"'--interval {kind}'") from None
 

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -124,17 +125,9 @@ def command(
             offset_m=(displaced, 0.0),
         )
         recovery = RejectionStreak(rejections=rejections) if rejections else None
-        robust = cooperative.slave_filter(
-            kernel,
-            kind=kind,
-            sigma_range_m=range_noise,
-            recovery=recovery,
-            residual=residual,
-            dtype=dtype,
-        )
-        plain = cooperative.slave_filter(
-            "unit", kind=kind, sigma_range_m=range_noise, recovery=None, dtype=dtype
-        )
+        make = partial(cooperative.slave_filter, kind=kind, sigma_range_m=range_noise, dtype=dtype)
+        robust = make(kernel, recovery=recovery, residual=residual)
+        plain = make("unit", recovery=None)
     settings = {
         "filter": kind,
         "kernel": {"name": kernel, **asdict(as_kernel(kernel))},

@@ -683,25 +683,20 @@ class GaussianFilter:
         rows[beyond] = np.nan
         return rows
 
-    def _as_input(self, input: npt.ArrayLike | None) -> Floats | None:
-        names = self._process.input
-        if not names:
-            self._refuse_input(input)
-            return None
-        return as_array("input", input, (len(names),), self._dtype)
-
-    def _as_inputs(self, input: npt.ArrayLike | None, count: int) -> Floats | None:
-        names = self._process.input
-        if not names:
-            self._refuse_input(input)
-            return None
-        inputs = as_array("input", input, (None, len(names)), self._dtype)
-        _require_rows("input", inputs, count)
-        return inputs
-
-    def _refuse_input(self, input: object) -> None:
+    def _as_input(self, input: npt.ArrayLike | None, *rows: None) -> Floats | None:
+        """Take the numbers of one prediction or, with a None, rows of them."""
+        size = len(self._process.input)
+        if size:
+            return as_array("input", input, (*rows, size), self._dtype)
         if input is not None:
             raise TypeError(f"input must be None: {type(self._process).__name__} has no input")
+        return None
+
+    def _as_inputs(self, input: npt.ArrayLike | None, count: int) -> Floats | None:
+        inputs = self._as_input(input, None)
+        if inputs is not None:
+            _require_rows("input", inputs, count)
+        return inputs
 
     def _as_place(self, place: npt.ArrayLike, handle: _Sensor[Any]) -> Floats:
         if handle.place == 0:

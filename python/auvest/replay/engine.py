@@ -374,12 +374,8 @@ class Tracker(Replay):
 
     def __init__(self, log: LogFolder, settings: Settings, filter_name: FilterName) -> None:
         super().__init__(log, settings, filter_name)
-        fixes, process = settings.fixes, settings.process
-        self._process = ConstantAcceleration(
-            position_psd=process.position_psd,
-            velocity_psd=process.velocity_psd,
-            acceleration_psd=process.acceleration_psd,
-        )
+        fixes = settings.fixes
+        self._process = ConstantAcceleration(**vars(settings.process))
         self._sensor = RangeBearing(
             sigma_range_m=fixes.sigma_range_m,
             sigma_bearing_rad=fixes.sigma_bearing_rad,

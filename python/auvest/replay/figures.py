@@ -47,8 +47,8 @@ def overview(result: Result) -> Figure:
 
 def tracks(result: Result) -> Figure:
     """Draw estimate, dead reckoning, truth and sources in the plane."""
-    figure = plots.new_figure((6.6, 5.6), "Tracks")
-    _tracks(figure.add_subplot(), result)
+    figure, axes = plots.new_axes((6.6, 5.6), "Tracks")
+    _tracks(axes, result)
     return figure
 
 
@@ -73,8 +73,7 @@ def innovations(result: Result) -> Figure:
 
 def nis(result: Result) -> Figure:
     """Draw the normalised innovation squared and its 95 % bound."""
-    figure = plots.new_figure(_WIDE, "Normalised innovation squared, before any weight")
-    axes = figure.add_subplot()
+    figure, axes = plots.new_axes(_WIDE, "Normalised innovation squared, before any weight")
     _nis(axes, result)
     axes.set_xlabel("time / s")
     return figure
@@ -82,8 +81,7 @@ def nis(result: Result) -> Figure:
 
 def weights(result: Result) -> Figure:
     """Draw the weights that the kernel gave, and what it rejected."""
-    figure = plots.new_figure(_WIDE, "Weights")
-    axes = figure.add_subplot()
+    figure, axes = plots.new_axes(_WIDE, "Weights")
     full, doubted = result.measurements.columns(), result.outliers.columns()
     axes.plot(full["time_s"], full["weight_0"], ".", color=plots.BLUE, markersize=3, label="weight")
     down = doubted["outcome"] == tables.DOWNWEIGHTED
@@ -103,8 +101,7 @@ def weights(result: Result) -> Figure:
 
 def held_out(result: Result) -> Figure:
     """Draw how far the predictions of measurements that the filter did not get were off."""
-    figure = plots.new_figure(_WIDE, "Error of predicting held-out measurements")
-    axes = figure.add_subplot()
+    figure, axes = plots.new_axes(_WIDE, "Error of predicting held-out measurements")
     rows = result.measurements.columns()
     axes.plot(rows["time_s"], rows["held_out_error_m"], ".", color=plots.BLUE, markersize=3)
     plots.style(axes, xlabel="time / s", ylabel="error / m")

@@ -6,7 +6,7 @@ leaves much open; every choice stands in :data:`ASSUMPTIONS` with its reason.
 
 from __future__ import annotations
 
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -126,20 +126,13 @@ def paper_filter(
     process = ConstantAcceleration(discretisation="euler" if track == "paper" else "exact")
     sigma_range_m, sigma_bearing_rad = noise.standard_deviation
     sensor = RangeBearing(sigma_range_m=sigma_range_m, sigma_bearing_rad=sigma_bearing_rad)
+    options: dict[str, Any] = {"process": process, "sensors": sensor, "dtype": dtype}
     if name == "ekf":
-        return Ekf(x0, P0, process=process, sensors=sensor, dtype=dtype)
-    points = {"alpha": alpha, "beta": beta, "kappa": kappa}
+        return Ekf(x0, P0, **options)
+    options.update(alpha=alpha, beta=beta, kappa=kappa)
     if name == "ukf":
-        return Ukf(x0, P0, process=process, sensors=sensor, dtype=dtype, **points)
-    return Aukf(
-        x0,
-        P0,
-        process=process,
-        sensors=sensor,
-        policy=MahalanobisInterval() if policy is None else policy,
-        dtype=dtype,
-        **points,
-    )
+        return Ukf(x0, P0, **options)
+    return Aukf(x0, P0, policy=policy or MahalanobisInterval(), **options)
 
 
 def observed_positions(

@@ -33,8 +33,7 @@ _MARKERS: Mapping[FilterName, str] = dict(zip(COLOURS, "os^DPv", strict=True))
 
 def _tracks(result: Reproduction) -> Figure:
     columns = tables(result)["fig02"]
-    figure = plots.new_figure((6.6, 4.4), "Fig. 2: true tracks")
-    axes = figure.add_subplot()
+    figure, axes = plots.new_axes((6.6, 4.4), "Fig. 2: true tracks")
     for name, colour in (("slave", plots.BLUE), ("master", plots.VERMILION)):
         x, y = columns[f"{name}_x_m"], columns[f"{name}_y_m"]
         axes.plot(x, y, color=colour, linewidth=1.8, label=name)
@@ -81,8 +80,7 @@ def _over_levels(
 def _over_time(result: Reproduction, *, stem: str, numbers: tuple[int, ...], title: str) -> Figure:
     columns = tables(result)[stem]
     time_s = columns["time_s"]
-    figure = plots.new_figure((6.6, 4.8), title)
-    axes = figure.add_subplot()
+    figure, axes = plots.new_axes((6.6, 4.8), title)
     for name, text in FILTERS.items():
         curves = [("", ":", text)]
         if name not in DEAF:
