@@ -24,13 +24,13 @@ import numpy as np
 
 from auvest import telemetry
 from auvest.board import Board, BoardError, SerialLine
+from auvest.firmware.package import PackageError, package
+from auvest.firmware.sketch import Compiled, SketchError, compile_sketch
 from auvest.scenarios import cooperative
 from auvest.scenarios.paper_aukf import FilterName, paper_filter, paper_noise
 from auvest.scenarios.tracking import Scenario, Track, simulate
-from firmware.package import PackageError, package
 from firmware.parity.slatf import FIELDS, paper_world
 from firmware.parity.targets import AVR_PARTICLES
-from firmware.sketch import Compiled, SketchError, compile_sketch
 
 ROOT = Path(__file__).resolve().parents[1]
 BUDGETS = ROOT / "firmware" / "budgets.csv"

@@ -23,6 +23,10 @@ COMMANDS: Mapping[tuple[str, ...], tuple[str, str]] = {
         "commands.capture",
         "Record what the sketch tracking_loop reports: a CSV file, a figure, a table.",
     ),
+    ("cost",): (
+        "commands.cost",
+        "Measure a filter with your models on the simulated MEGA2560: flash, RAM, stack, cycles.",
+    ),
     ("filters",): (
         "commands.filters",
         "List the filters: what each takes, and where it runs with the same bits.",
@@ -107,6 +111,8 @@ First steps:
   auvest reproduce mrclam6           real robots: SLATF and EKF-SLAT with an IMM master
 
   auvest replay --help               your own recordings through any filter
+
+  auvest cost my_models.hpp          what your models take on the chip, and their bits there
 
   auvest capture --help              record what a board reports, real or simulated
 
