@@ -238,25 +238,18 @@ def keywords(folder) -> dict[str, str]:
     return dict(pairs)
 
 
-def test_keywords_are_the_public_types(keywords, folder):
-    """Types in namespace auvest, of the headers that a user names types from."""
-    public = set()
-    for path in (folder / "src" / "auvest").rglob("*.hpp"):
-        named = {"random.hpp", "resampling.hpp"}
-        if path.parent.name in {"math", "particles"} and path.name not in named:
-            continue
-        text = re.sub(r"namespace detail \{.*?\n\}  // namespace detail", "", path.read_text(),
-                      flags=re.DOTALL)  # fmt: skip
-        public |= set(re.findall(r"^(?:class|struct|enum class|using) (\w+)(?![\w<;])", text,
-                                 re.MULTILINE))  # fmt: skip
+def test_keywords_are_the_types_that_a_sketch_names(keywords, folder):
     types = {name for name, kind in keywords.items() if kind == "KEYWORD1"}
-    internal = {"GaussianFilter", "SigmaPoints", "SquareRootUpdate", "Posterior"}
-    internal |= {"JointGaussian", "MeasurementProposal", "MotionProposal", "Place", "Score"}
-    internal |= {"ChosenModel", "MasterBank", "MasterEkf", "ParticleSlatFilter", "SlatFilter"}
-    internal |= {"SlatfFrame", "SlatfJointFields", "SlatfJointFrame", "SlatfParticle"}
-    internal |= {"CubaturePoints", "IsLinear", "SigmaPointFilter"}
-    internal |= {"EventArray", "LateEvent", "LateMemory"}
-    assert types == public - internal
+    sketches = [*(folder / "examples").rglob("*.ino"), *(folder / "examples").rglob("*.h")]
+    code = "".join(path.read_text() for path in sketches)
+    named = set(re.findall(r"\bauvest::([A-Z]\w+)", code))
+    assert {"Aukf", "Vector", "Slatf2"} <= named <= types
+    # One of each form: class, struct, enum class, using; and none of what is in a detail namespace.
+    assert {"Ckf", "Hampel", "Decision", "RobustEkf", "Status"} <= types
+    assert "DoubleTrigonometry" not in types
+    text = "".join(path.read_text() for path in (folder / "src" / "auvest").rglob("*.hpp"))
+    for name in types:
+        assert re.search(rf"\b{name}\b[^;]*[{{=]", text), name
 
 
 def test_keywords_are_the_values_of_status(keywords, folder):

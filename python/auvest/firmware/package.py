@@ -8,6 +8,7 @@ The library is ``firmware/library``, completed with what lives elsewhere or is g
 - ``src/Eigen``: the headers of Eigen that these include, as the compilers list them;
 - ``src/*``: the C++ standard headers of ``firmware/avr_std``. Arduino puts ``src`` on the include
   path of every board, so each of them gives way to the toolchain's own where there is one;
+- the names of types and of the values of ``Status``, which the IDE colours, from the headers;
 - the version and the licences.
 
 The same sources give the same bytes, whenever and wherever the zip is made.
@@ -17,6 +18,7 @@ from __future__ import annotations
 
 import argparse
 import io
+import re
 import shlex
 import shutil
 import subprocess
@@ -34,6 +36,9 @@ _COMPILERS = {
     "avr-g++": ("gcc-avr avr-libc", ["-mmcu=atmega2560", "-std=gnu++11"]),
     "g++": ("g++", ["-DARDUINO", "-std=gnu++17"]),
 }
+# A type of namespace auvest, which begins a line; what is for the library's own use.
+_TYPE = re.compile(r"^(?:class|struct|enum class|using) (\w+)(?![\w<;])", re.MULTILINE)
+_DETAIL = re.compile(r"namespace detail \{.*?\n\}  // namespace detail", re.DOTALL)
 
 
 class PackageError(RuntimeError):
@@ -90,10 +95,23 @@ def contents() -> dict[str, bytes]:
     files = {name: path.read_bytes() for name, path in origins.items()}
     for name in ("library.properties", "library.json"):
         files[name] = files[name].replace(b"{version}", version(NAME).encode())
+    files["keywords.txt"] += _keywords(headers / "auvest").encode()
     licences = _holding("README.Eigen", [eigen / "Eigen", tree / "cpp" / "licences"])
     parts = [(licences / name).read_bytes() for name in ("README.Eigen", "COPYING.MPL2")]
     files["LICENSE-Eigen.txt"] = b"\n".join(parts)
     return dict(sorted(files.items()))
+
+
+def _keywords(headers: Path) -> str:
+    """Name the types of namespace auvest and the values of its Status, as keywords.txt has them."""
+    types = set()
+    for path in headers.rglob("*.hpp"):
+        types |= set(_TYPE.findall(_DETAIL.sub("", path.read_text(encoding="utf-8"))))
+    status = (headers / "status.hpp").read_text(encoding="utf-8")
+    values = re.findall(r"^  (k\w+)", status, re.MULTILINE)
+    lines = ["", "# Types", *(f"{name}\tKEYWORD1" for name in sorted(types))]
+    lines += ["", "# Values of Status", *(f"{name}\tLITERAL1" for name in values), ""]
+    return "\n".join(lines)
 
 
 def package(output: Path) -> Path:
