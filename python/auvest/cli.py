@@ -21,6 +21,9 @@ from auvest.commands.exit_codes import EXIT_CODES
 #: First line of help of each command, by the words that call it.
 COMMANDS: Mapping[tuple[str, ...], str] = {
     ("capture",): "Record what the sketch tracking_loop reports: a CSV file, a figure, a table.",
+    ("cost",): (
+        "Measure a filter with your models on the simulated MEGA2560: flash, RAM, stack, cycles."
+    ),
     ("filters",): "List the filters: what each takes, and where it runs with the same bits.",
     ("import",): "Turn a published recording into logs for 'auvest replay'.",
     ("replay",): "Replay recorded runs through a filter.",
@@ -146,6 +149,8 @@ def _main(
       auvest reproduce mrclam6           real robots: SLATF and EKF-SLAT with an IMM master
 
       auvest replay --help               your own recordings through any filter
+
+      auvest cost my_models.hpp          what your models take on the chip, and their bits there
 
       auvest capture --help              record what a board reports, real or simulated
     """
