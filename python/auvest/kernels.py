@@ -45,8 +45,7 @@ class Kernel(Checked):
 
     def _map(self, function: str, t: npt.ArrayLike) -> npt.NDArray[np.float64]:
         residuals = as_array("t", t, (None,), np.dtype(np.float64))
-        values: npt.NDArray[np.float64] = getattr(core_kernel(self, "float64"), function)(residuals)
-        return values
+        return getattr(core_kernel(self, "float64"), function)(residuals)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,5 +144,4 @@ def core_kernel(kernel: Kernel, dtype: str) -> _Kernel[Any]:
     """Build the core's kernel in this precision."""
     params = asdict(kernel)
     require_range({k: v for k, v in params.items() if v != float("inf")}, dtype)
-    built: _Kernel[Any] = getattr(getattr(_core, f"Kernel_{dtype}"), kernel.name)(params)
-    return built
+    return getattr(getattr(_core, f"Kernel_{dtype}"), kernel.name)(params)

@@ -72,8 +72,7 @@ class Session:
                 return simulate(*arguments, progress=progress, **options)
             except KeyboardInterrupt as stop:
                 self.interrupted = True
-                partial: R | None = getattr(stop, "partial", None)
-                return partial
+                return getattr(stop, "partial", None)
 
     def nothing_done(self) -> NoReturn:
         """End after Ctrl-C before the first run was done."""

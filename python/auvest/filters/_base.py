@@ -166,14 +166,12 @@ class GaussianFilter:
     @property
     def x(self) -> Floats:
         """The estimate, shape (n,), a copy; its components are named by ``process.state``."""
-        x: Floats = self._filter.x
-        return x
+        return self._filter.x
 
     @property
     def P(self) -> Floats:
         """The covariance of the estimate, shape (n, n), a copy."""
-        p: Floats = self._filter.P
-        return p
+        return self._filter.P
 
     @property
     def report(self) -> Report | None:
@@ -238,8 +236,7 @@ class GaussianFilter:
     @property
     def residual(self) -> Residual:
         """Which residual the kernel judges."""
-        kind: Residual = self._options["residual"]
-        return kind
+        return self._options["residual"]
 
     @property
     def late_s(self) -> float:
@@ -282,8 +279,7 @@ class GaussianFilter:
     def _last(self, name: str, axes: int) -> Floats:
         given = self._filter.report
         if given is not None:
-            last: Floats = given[name]
-            return last
+            return given[name]
         size = self._only.size if self._only is not None else 0
         return np.full((size,) * axes, np.nan, self._dtype)
 

@@ -109,18 +109,16 @@ class ProcessModel(Model):
             make_process = getattr(_core, f"make_process_{dtype.name}")
             return make_process(self.core_name, self.values(dtype.name))
 
-        process: _Process[Any] = self._handle(dtype.name, make)
-        return process
+        return self._handle(dtype.name, make)
 
     def f(
         self, x: npt.ArrayLike, dt: float, input: npt.ArrayLike | None = None
     ) -> npt.NDArray[np.float64]:
         """State (n,) after ``dt >= 0`` seconds without noise, in float64."""
         state = as_array("x", x, (len(self.state),), _FLOAT64)
-        after: npt.NDArray[np.float64] = self.core(_FLOAT64).f(
+        return self.core(_FLOAT64).f(
             state, as_number("dt", dt, "not negative"), self._as_input(input)
         )
-        return after
 
     def Phi(
         self, dt: float, x: npt.ArrayLike | None = None, input: npt.ArrayLike | None = None
@@ -131,17 +129,13 @@ class ProcessModel(Model):
         state: npt.NDArray[np.float64] = np.zeros(len(self.state))
         if x is not None:
             state = as_array("x", x, (len(self.state),), _FLOAT64).astype(np.float64)
-        phi: npt.NDArray[np.float64] = self.core(_FLOAT64).Phi(
+        return self.core(_FLOAT64).Phi(
             state, as_number("dt", dt, "not negative"), self._as_input(input)
         )
-        return phi
 
     def Q(self, dt: float, input: npt.ArrayLike | None = None) -> npt.NDArray[np.float64]:
         """Covariance (n, n) of the process noise of ``dt >= 0`` seconds, in float64."""
-        q: npt.NDArray[np.float64] = self.core(_FLOAT64).Q(
-            as_number("dt", dt, "not negative"), self._as_input(input)
-        )
-        return q
+        return self.core(_FLOAT64).Q(as_number("dt", dt, "not negative"), self._as_input(input))
 
     def _as_input(self, input: npt.ArrayLike | None) -> npt.NDArray[np.float64]:
         if input is None:
@@ -197,8 +191,7 @@ class MeasurementModel(Model):
             sensor.description = saved_as(self)
             return sensor
 
-        sensor: _Sensor[Any] = self._handle((states, dtype.name), make)
-        return sensor
+        return self._handle((states, dtype.name), make)
 
     def h(self, x: npt.ArrayLike) -> npt.NDArray[np.float64]:
         """Measurements without noise.

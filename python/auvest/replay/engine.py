@@ -332,8 +332,7 @@ class Localiser(Replay):
             first, end = (math.floor((t - self.start[0]) / step) for t in (self._now, limit))
             grid = self.start[0] + step * np.arange(first + 1, end + 1)
             parts.append(grid[(grid > self._now) & (grid <= limit)])
-        times: Rows = np.unique(np.concatenate(parts))
-        return times
+        return np.unique(np.concatenate(parts))
 
     def _run(
         self, z: Rows, dt: Rows, motion: Rows, place: Rows
@@ -506,8 +505,7 @@ class Tracker(Replay):
         k = np.searchsorted(at, time_s, side="right") - 1
         dt = (time_s - at[k])[:, None]
         half_square = 0.5 * dt * dt
-        position: Rows = states[k, 0:2] + dt * states[k, 2:4] + half_square * states[k, 4:6]
-        return position
+        return states[k, 0:2] + dt * states[k, 2:4] + half_square * states[k, 4:6]
 
 
 def _build(

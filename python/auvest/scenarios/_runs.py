@@ -28,8 +28,7 @@ class Runs:
     @property
     def failed(self) -> npt.NDArray[np.bool_]:
         """Runs whose status is not ok, shape (runs,)."""
-        failed: npt.NDArray[np.bool_] = self.status != int(Status.ok)
-        return failed
+        return self.status != int(Status.ok)
 
     @property
     def rmse_m(self) -> float:

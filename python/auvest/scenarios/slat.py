@@ -222,14 +222,12 @@ class SlatResult(Runs):
     @property
     def distance_m(self) -> Floats:
         """Length of the error of the slave's position, m, shape (runs, pings)."""
-        distance: Floats = np.sqrt(np.square(self.error).sum(axis=-1))
-        return distance
+        return np.sqrt(np.square(self.error).sum(axis=-1))
 
     @property
     def run_rmse_m(self) -> Floats:
         """Root mean square over time of each run, m, shape (runs,)."""
-        per_run: Floats = np.sqrt(np.nanmean(np.square(self.distance_m), axis=1))
-        return per_run
+        return np.sqrt(np.nanmean(np.square(self.distance_m), axis=1))
 
     @property
     def rmse_m(self) -> float:

@@ -250,5 +250,4 @@ def core_sonar(model: Sonar, dtype: str) -> _core._Sonar:
     params = asdict(model)
     bearing = params.pop("bearing")
     require_range(params, dtype, squared=tuple(params))
-    sonar: _core._Sonar = getattr(_core, f"Sonar_{dtype}")(params, bearing)
-    return sonar
+    return getattr(_core, f"Sonar_{dtype}")(params, bearing)

@@ -329,14 +329,12 @@ def swapped(result: SlatResult) -> npt.NDArray[np.bool_]:
     apart = estimate[:, :, :, None, :] - result.masters[None, :, None, :, :]
     distance = np.hypot(apart[..., 0], apart[..., 1])
     right = distance[..., 0, 0] + distance[..., 1, 1]
-    wrong: npt.NDArray[np.bool_] = distance[..., 0, 1] + distance[..., 1, 0] < right
-    return wrong
+    return distance[..., 0, 1] + distance[..., 1, 0] < right
 
 
 def _rmse(error: Floats) -> Floats:
     """Root mean square of each run over pings and masters of errors (runs, pings, M, 2)."""
-    per_run: Floats = np.sqrt(np.square(error).sum(axis=-1).mean(axis=(1, 2)))
-    return per_run
+    return np.sqrt(np.square(error).sum(axis=-1).mean(axis=(1, 2)))
 
 
 def _mean(per_run: Floats) -> dict[str, float]:

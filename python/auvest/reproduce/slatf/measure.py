@@ -195,8 +195,7 @@ def error_variance(result: SlatResult) -> float:
 
 def rms_per_ping(result: SlatResult) -> Floats:
     """Root mean square error over the runs at each ping, m."""
-    rms: Floats = np.sqrt(np.square(result.distance_m).mean(axis=0))
-    return rms
+    return np.sqrt(np.square(result.distance_m).mean(axis=0))
 
 
 # Machine-readable result.
