@@ -145,10 +145,9 @@ def core_interval(policy: IntervalPolicy, dtype: str) -> _Interval:
         CovarianceBudget: core.covariance_budget,
     }[type(policy)]
     try:
-        interval: _Interval = build(params)
+        return build(params)
     except _core.StatusError as error:
         raise ValueError(f"{policy} does not suit {dtype}: {error}") from None
-    return interval
 
 
 def _check_limits(policy: CovarianceBudget | MahalanobisInterval) -> None:

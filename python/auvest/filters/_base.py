@@ -149,7 +149,7 @@ class GaussianFilter:
             "late_s": self._options["late_s"],
         }
         try:
-            made: _Filter[Any] = getattr(_core, f"Filter_{name}")(
+            return getattr(_core, f"Filter_{name}")(
                 self._process.core(self._dtype),
                 core_kernel(_UNIT if self._kernel is None else self._kernel, name),
                 core_interval(_FIXED if policy is None else policy, name),
@@ -159,7 +159,6 @@ class GaussianFilter:
             given = {**self._parameters, "tolerance": self._options["tolerance"]}
             text = ", ".join(f"{key}={value}" for key, value in given.items())
             raise ValueError(f"{text} do not suit {name}: {error}") from None
-        return made
 
     # ---- What can be read -----------------------------------------------------------------------
 

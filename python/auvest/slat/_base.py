@@ -76,15 +76,13 @@ class Steps:
     def x(self) -> Floats:
         """The slave's estimated pose (m, rad), shape (n,), a copy."""
         with self._exclusive:
-            x: Floats = self._slave()[0]
-        return x
+            return self._slave()[0]
 
     @property
     def P(self) -> Floats:
         """Its covariance, shape (n, n), a copy."""
         with self._exclusive:
-            p: Floats = self._slave()[1]
-        return p
+            return self._slave()[1]
 
     def master(self, n: int) -> tuple[Floats, Floats]:
         """Give mean (6,) and covariance (6, 6) of master n, ``[x, y, vx, vy, ax, ay]``.
@@ -95,8 +93,7 @@ class Steps:
             If there is no such master.
         """
         with self._exclusive:
-            x, p = self._core_steps.master(self._as_master(n))
-        return x, p
+            return self._core_steps.master(self._as_master(n))
 
     @property
     def status(self) -> Status:
@@ -334,8 +331,7 @@ class Steps:
         raise NotImplementedError
 
     def _slave(self) -> tuple[Floats, Floats]:
-        x, p = self._core_steps.slave()
-        return x, p
+        return self._core_steps.slave()
 
     def _do(
         self, name: str, plain: tuple[Any, ...], convert: Callable[[], tuple[Any, ...]], *rest: Any
@@ -625,15 +621,13 @@ class ParticleSlatFilter(SlatFilter):
     def weights(self) -> Floats:
         """Normalised weights of the particles, shape (N,), a copy."""
         with self._exclusive:
-            weights: Floats = self._core_steps.particles()[0]
-        return weights
+            return self._core_steps.particles()[0]
 
     @property
     def poses(self) -> Floats:
         """Poses of the particles (:class:`SlatfJoint`: their means), shape (N, n), a copy."""
         with self._exclusive:
-            poses: Floats = self._core_steps.particles()[1]
-        return poses
+            return self._core_steps.particles()[1]
 
 
 def as_covariance(name: str, value: object, n: int, dtype: DType, *, definite: bool) -> Floats:
