@@ -84,15 +84,15 @@ wheel: setup ## a wheel of the package in dist/
 	$(PY) -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .
 	@ls dist/*.whl
 
-library: setup-dev ## the Arduino library: a zip in dist/
-	$(PY) -m firmware.package --output dist
+library: setup-dev install ## the Arduino library: a zip in dist/
+	$(PY) -m auvest.firmware.package --output dist
 
 # The simulated board, and the sketch tracking_loop compiled for it.
 .PHONY: board capture
 board: library ## the simulated MEGA2560 and the sketch tracking_loop for it, in build/
 	cmake -S . -B build/firmware --log-level=WARNING -D AUVEST_BUILD_FIRMWARE=ON
 	cmake --build build/firmware
-	$(PY) -m firmware.sketch firmware/library/examples/tracking_loop \
+	$(PY) -m auvest.firmware.sketch firmware/library/examples/tracking_loop \
 	    --library dist/auvest-*.zip --output build/sketch
 
 capture: board install ## run tracking_loop on the simulated board: table and picture of the track

@@ -25,13 +25,13 @@ import numpy as np
 
 from auvest import telemetry
 from auvest.board import Board, BoardError, SerialLine
+from auvest.firmware.package import PackageError, package
+from auvest.firmware.sketch import Compiled, SketchError, compile_sketch
 from auvest.scenarios import cooperative
 from auvest.scenarios.paper_aukf import FilterName, paper_filter, paper_noise
 from auvest.scenarios.tracking import Scenario, Track, simulate
-from firmware.package import PackageError, package
 from firmware.parity.slatf import fields_of, paper_world
 from firmware.parity.targets import AVR_PARTICLES
-from firmware.sketch import Compiled, SketchError, compile_sketch
 
 ROOT = Path(__file__).resolve().parents[1]
 BUDGETS = ROOT / "firmware" / "budgets.csv"
@@ -45,7 +45,14 @@ TARGET = "atmega2560"
 TOLERANCE = 0.02
 
 #: Steps that each filter is measured over. The vehicle reaches every bearing and the near field.
-STEPS = {"ekf": 1_000, "ukf": 1_000, "aukf": 10_000, "aukf_covariance_budget": 1_000}
+STEPS = {
+    "ekf": 1_000,
+    "ukf": 1_000,
+    "ckf": 1_000,
+    "robust_ukf": 1_000,
+    "aukf": 10_000,
+    "aukf_covariance_budget": 1_000,
+}
 STEPS.update(robust_ekf_predict=1_000, robust_ekf_update=1_000)
 
 #: Particles of SlatfJoint: whole blocks that the RAM holds beside the stack.
@@ -135,6 +142,13 @@ _PROGRAMS: Mapping[str, Program] = {
     "empty": ("empty", {}),
     "ekf": _filter("auvest::Ekf<Process>", "Process()", _FIXED_STEP),
     "ukf": _filter("auvest::Ukf<Process>", "Process(), points()", _FIXED_STEP),
+    "ckf": _filter("auvest::Ckf<Process>", "Process()", _FIXED_STEP),
+    "robust_ukf": _filter(
+        "auvest::Robust<auvest::Ukf<Process>, auvest::RobustUpdate<auvest::Hampel<float>, "
+        "auvest::RejectionStreak<float>>>",
+        "auvest::Ukf<Process>(Process(), points())",
+        _FIXED_STEP,
+    ),
     "aukf": _filter("auvest::Aukf<Process>", "Process(), points()", _ADAPTIVE_STEP),
     "aukf_covariance_budget": _filter(
         "auvest::Aukf<Process, auvest::CovarianceBudget<float>>",
@@ -171,8 +185,8 @@ def _record(program: str) -> bytes:
     """Start, variances and the steps of a vehicle that circles through the station."""
     if _PROGRAMS[program][0] == "range_filter":
         return _range_record(STEPS[program])
-    names: Mapping[str, FilterName] = {"ekf": "ekf", "ukf": "ukf"}
-    name = names.get(program, "aukf")
+    adaptive = program.startswith("aukf")
+    name: FilterName = "aukf" if adaptive else "ekf" if program == "ekf" else "ukf"
     filter_ = paper_filter(name, noise=paper_noise("normal"), track="turn", dtype="float32")
     scenario = Scenario(
         track=Track(kind="turn", turn_rate=0.05, wander_m=0.2),
@@ -420,7 +434,8 @@ def page(rows: list[Row]) -> str:
         lines.append(f"| {' | '.join(cells)} |")
     lines += [
         "",
-        "`ekf` and `ukf`: predict and update; `aukf` and `aukf_covariance_budget`: with the",
+        "`ekf`, `ukf`, `ckf`: predict and update; `robust_ukf`: with Hampel's kernel and the",
+        "recovery; `aukf` and `aukf_covariance_budget`: with the",
         "interval feedback (the paper's law; the covariance budget). Six states, float, the",
         f"paper's model, alpha = 1e-6, range and bearing, {STEPS['ekf']:,} steps (`aukf`:",
         f"{STEPS['aukf']:,}); the vehicle circles through the station, so the near field and every",

@@ -62,20 +62,28 @@ struct MyAcceleration : auvest::ProcessModel<MyAcceleration<Scalar_>, Scalar_, 6
 
   // The integral of Phi(s) diag(psd) Phi(s)' over s from 0 to dt.
   Covariance Q(Scalar dt) const {
-    const Scalar p = params.position_psd;
-    const Scalar v = params.velocity_psd;
-    const Scalar a = params.acceleration_psd;
-    const Scalar dt2 = dt * dt;
     Covariance q = Covariance::Zero();
-    for (int i = 0; i < 2; ++i) {
-      q(i, i) = dt * (p + dt2 * (v / Scalar(3) + dt2 * (a / Scalar(20))));
-      q(i + 2, i + 2) = dt * (v + dt2 * (a / Scalar(3)));
-      q(i + 4, i + 4) = a * dt;
-      q(i, i + 2) = q(i + 2, i) = dt2 * (v / Scalar(2) + dt2 * (a / Scalar(8)));
-      q(i, i + 4) = q(i + 4, i) = dt2 * dt * (a / Scalar(6));
-      q(i + 2, i + 4) = q(i + 4, i + 2) = dt2 * (a / Scalar(2));
-    }
+    add_noise(q, dt);
+    auvest::math::mirror_lower(q);
     return q;
+  }
+
+  // Optional: x <- f(x) and P <- Phi P Phi' + Q in place, from the structure of Phi. A third of the
+  // step on the chip. Row by row, every element is formed from elements further down or to the
+  // right, which still hold their old values; of P the lower triangle counts.
+  void propagate(auvest::Belief<Scalar, 6>& belief, Scalar dt) const {
+    Covariance& p = belief.P;
+    const Scalar half = Scalar(0.5) * dt * dt;
+    auvest::math::mirror_lower(p);
+    for (int i = 0; i < 6; ++i) {
+      Scalar* const row = &p(i, 0);
+      const int count = i == 0 ? 5 : 6;
+      if (i < 4) auvest::math::add_scaled(dt, row + 12, row, count);
+      if (i < 2) auvest::math::add_scaled(half, row + 24, row, count);
+      advance(row, i + 1, dt, half);
+    }
+    add_noise(p, dt);
+    advance(belief.x.data(), 6, dt, half);
   }
 
   // Optional: whether the parameters make sense.
@@ -84,6 +92,28 @@ struct MyAcceleration : auvest::ProcessModel<MyAcceleration<Scalar_>, Scalar_, 6
                       auvest::math::is_nonnegative(params.velocity_psd) &&
                       auvest::math::is_nonnegative(params.acceleration_psd);
     return good ? auvest::Status::kOk : auvest::Status::kBadParameter;
+  }
+
+ private:
+  // The first `count` components of v <- Phi v.
+  static void advance(Scalar* v, int count, Scalar dt, Scalar half) {
+    auvest::math::add_scaled(dt, v + 2, v, count < 4 ? count : 4);
+    auvest::math::add_scaled(half, v + 4, v, count < 2 ? count : 2);
+  }
+
+  // Adds Q to the lower triangle of p.
+  void add_noise(Covariance& p, Scalar dt) const {
+    const Scalar v = params.velocity_psd;
+    const Scalar a = params.acceleration_psd;
+    const Scalar dt2 = dt * dt;
+    for (int i = 0; i < 2; ++i) {
+      p(i, i) += dt * (params.position_psd + dt2 * (v / Scalar(3) + dt2 * (a / Scalar(20))));
+      p(i + 2, i + 2) += dt * (v + dt2 * (a / Scalar(3)));
+      p(i + 4, i + 4) += a * dt;
+      p(i + 2, i) += dt2 * (v / Scalar(2) + dt2 * (a / Scalar(8)));
+      p(i + 4, i) += dt2 * dt * (a / Scalar(6));
+      p(i + 4, i + 2) += dt2 * (a / Scalar(2));
+    }
   }
 };
 
@@ -140,31 +170,36 @@ struct MyRangeBearing : auvest::MeasurementModel<MyRangeBearing<Scalar_, N>, Sca
   }
 
   Noise R() const {
-    Noise noise = Noise::Zero();
+    Noise noise;
     noise(0, 0) = params.sigma_range_m * params.sigma_range_m;
+    noise(0, 1) = noise(1, 0) = Scalar(0);
     noise(1, 1) = params.sigma_bearing_rad * params.sigma_bearing_rad;
     return noise;
   }
 
   // The bearing is an angle: differences are wrapped.
   Measurement residual(const Measurement& z, const Measurement& predicted) const {
-    Measurement difference = z - predicted;
-    difference(1) = auvest::math::wrap(difference(1));
+    Measurement difference;
+    difference(0) = z(0) - predicted(0);
+    difference(1) = auvest::math::wrap(z(1) - predicted(1));
     return difference;
   }
 
   // Optional: h about a state, so that the UKF need not subtract h(x + e) - h(x), in which digits
   // are lost. H(x) alone would serve the EKF.
   struct Expansion {
-    Scalar dx, dy, square, range;
+    Scalar offset[2];  // from the station
+    Scalar square, inverse_square, range;
     Measurement centre;
 
     const Measurement& value() const { return centre; }
 
     Jacobian H() const {
       Jacobian jacobian;
-      jacobian << dx * (Scalar(1) / range), dy * (Scalar(1) / range),  //
-          -(dy * (Scalar(1) / square)), dx * (Scalar(1) / square);
+      jacobian(0, 0) = offset[0] * (Scalar(1) / range);
+      jacobian(0, 1) = offset[1] * (Scalar(1) / range);
+      jacobian(1, 0) = -(offset[1] * inverse_square);
+      jacobian(1, 1) = offset[0] * inverse_square;
       return jacobian;
     }
 
@@ -172,12 +207,14 @@ struct MyRangeBearing : auvest::MeasurementModel<MyRangeBearing<Scalar_, N>, Sca
     // is the fraction p of the range, and across it q (docs/algorithms/ukf.md).
     void deviations(const ObservedState& e, Measurement& sum, Measurement& difference) const {
       const Scalar one = Scalar(1);
-      const Scalar p = (dx * e(0) + dy * e(1)) * (one / square);
-      const Scalar q = (dx * e(1) - dy * e(0)) * (one / square);
+      const Scalar p = auvest::math::dot(offset, e.data(), 2) * inverse_square;
+      const Scalar q = auvest::math::cross(offset, e.data()) * inverse_square;
       const Scalar size = p * p + q * q;
       if (size < Scalar(0.25) * auvest::math::machine_epsilon<Scalar>()) {
-        sum << range * (q * q), -(p * (Scalar(2) * q));
-        difference << Scalar(2) * range * p, Scalar(2) * q;
+        sum(0) = range * (q * q);
+        sum(1) = -(p * (q + q));
+        difference(0) = (range + range) * p;
+        difference(1) = q + q;
         return;
       }
       // The ranges of both points, in units of the range between them.
@@ -186,21 +223,23 @@ struct MyRangeBearing : auvest::MeasurementModel<MyRangeBearing<Scalar_, N>, Sca
       const Scalar w = one - size;
       // further * nearer - w, without the loss of digits where it is small
       Scalar g = further * nearer - w;
-      if (w > Scalar(0)) g = Scalar(2) * q * (Scalar(2) * q) / (further * nearer + w);
-      sum(0) = Scalar(2) * range * g / (further + nearer + Scalar(2));
-      difference(0) = Scalar(2) * range * (Scalar(2) * p) / (further + nearer);
-      sum(1) = auvest::math::atan2(-(p * (Scalar(2) * q)), one - p * p + q * q);
-      difference(1) = auvest::math::atan2(Scalar(2) * q, w);
+      if (w > Scalar(0)) g = (q + q) * (q + q) / (further * nearer + w);
+      sum(0) = (range + range) * g / (further + nearer + Scalar(2));
+      difference(0) = (range + range) * (p + p) / (further + nearer);
+      sum(1) = auvest::math::atan2(-(p * (q + q)), one - p * p + q * q);
+      difference(1) = auvest::math::atan2(q + q, w);
     }
   };
 
   Expansion about(const State& x) const {
     Expansion point;
-    point.dx = x(0) - params.station_x_m;
-    point.dy = x(1) - params.station_y_m;
-    point.square = point.dx * point.dx + point.dy * point.dy;
-    point.centre = h(x);
-    point.range = point.centre(0);
+    point.offset[0] = x(0) - params.station_x_m;
+    point.offset[1] = x(1) - params.station_y_m;
+    point.square = auvest::math::dot(point.offset, point.offset, 2);
+    point.inverse_square = Scalar(1) / point.square;
+    point.range = auvest::math::sqrt(point.square);
+    point.centre(0) = point.range;
+    point.centre(1) = auvest::math::atan2(point.offset[1], point.offset[0]);
     return point;
   }
 
@@ -211,7 +250,7 @@ struct MyRangeBearing : auvest::MeasurementModel<MyRangeBearing<Scalar_, N>, Sca
     const Scalar reach = params.near_field * params.near_field * (P(0, 0) + P(1, 1));
     if (point.square > reach + Scalar(1e-30)) return false;
     Scalar sine, cosine;
-    auvest::math::sincos(auvest::math::wrap(z(1)), sine, cosine);
+    auvest::math::sincos_near(auvest::math::wrap(z(1)), sine, cosine);
     const Scalar range2 = z(0) * z(0);
     const Scalar var_range = params.sigma_range_m * params.sigma_range_m;
     const Scalar var_bearing = params.sigma_bearing_rad * params.sigma_bearing_rad;
@@ -219,13 +258,11 @@ struct MyRangeBearing : auvest::MeasurementModel<MyRangeBearing<Scalar_, N>, Sca
     const Scalar along =
         auvest::math::sqrt(var_range + Scalar(0.75) * range2 * var_bearing * var_bearing);
     const Scalar across = auvest::math::sqrt((range2 + var_range) * var_bearing);
-    auvest::Matrix<Scalar, 2, 2> root;
-    root << along * cosine, -(across * sine), along * sine, across * cosine;
-    innovation << z(0) * cosine - point.dx, z(0) * sine - point.dy;
+    const Scalar root[2][2] = {{along * cosine, -(across * sine)}, {along * sine, across * cosine}};
+    innovation(0) = z(0) * cosine - point.offset[0];
+    innovation(1) = z(0) * sine - point.offset[1];
     for (int i = 0; i < 2; ++i) {
-      for (int j = 0; j < 2; ++j) {
-        noise(i, j) = root(i, 0) * root(j, 0) + root(i, 1) * root(j, 1);
-      }
+      for (int j = 0; j < 2; ++j) noise(i, j) = auvest::math::dot(root[i], root[j], 2);
     }
     return true;
   }

@@ -1,10 +1,10 @@
 // The replay of a robust EKF, UKF or CKF: speed and heading or odometry, ranges to leaders. As
 // replay.hpp, with records of its own kind:
 //
-//     record: process + 256 times filter, steps, kernel, its three thresholds, post-fit?,
-//     rejections (0: no recovery),
+//     record: process + 256 times filter + 65536 where measurements are late, steps, kernel, its
+//             three thresholds, post-fit?, rejections (0: no recovery),
 //             process parameters, sensor (leader left out), x0, P0,
-//             then per step: flags, dt, input, z, leader
+//             then per step: flags, dt, input, z, leader, and where they are late age
 //     trace:  status of reset, then per step: x, P, innovation, S, nis, standardised, weight,
 //             variance asked for by the recovery and its two recent rejections, two words of counts
 //             and statuses
@@ -12,6 +12,7 @@
 
 #include "auvest/filters/ckf.hpp"
 #include "auvest/filters/ekf.hpp"
+#include "auvest/filters/late_updates.hpp"
 #include "auvest/filters/robust.hpp"
 #include "auvest/filters/ukf.hpp"
 #include "auvest/models/leader_range.hpp"
@@ -33,9 +34,14 @@ class RobustReplay {
     enum Filter : std::uint32_t { kEkf, kUkf, kCkf };
     const std::uint32_t kind = stream_.read();
     const std::uint32_t process = kind % 256;
-    const std::uint32_t filter = kind / 256;
+    const std::uint32_t filter = kind / 256 % 256;
+    const bool late = kind >= 65536;
     steps_ = stream_.read();
     read_rule();
+    if (late) {  // of one filter, so that the program fits into the chip
+      replay<Ekf<SpeedHeading<float>>, Late>();
+      return;
+    }
     if (process == kSpeedHeading) replay<Ekf<SpeedHeading<float>>>();
     if (process == kSpeedHeadingBiasScale) {
       using Process = SpeedHeading<float, true, true>;
@@ -74,13 +80,35 @@ class RobustReplay {
     }
   }
 
-  template <class Plain>
+  /// A filter whose measurements come in time, with the interface of LateUpdates.
+  template <class Filter, class Sensor>
+  struct InTime {
+    Filter now;
+    explicit InTime(const Filter& filter) : now(filter) {}
+
+    Status predict(float dt, const typename Filter::Process::Input& input) {
+      return now.predict(dt, input);
+    }
+    RobustCorrection<float, 1> update(const Vector<float, 1>& z, const Sensor& sensor, float) {
+      return now.update(z, sensor);
+    }
+    const Filter& filter() const { return now; }
+  };
+
+  /// Its last twelve events may still be preceded.
+  template <class Filter, class Sensor>
+  struct Late : LateUpdates<Filter, Sensor, 12> {
+    explicit Late(const Filter& filter) : LateUpdates<Filter, Sensor, 12>(filter) {}
+  };
+
+  template <class Plain, template <class, class> class Taker = InTime>
   void replay() {
     using Process = typename Plain::Process;
     using Filter = Robust<Plain, Rule>;
     typename Process::Params params;
     params.visit([this](const char*, float& value) { value = read(); });
-    LeaderRange<float, Process::kStates> sensor;
+    using Sensor = LeaderRange<float, Process::kStates>;
+    Sensor sensor;
     sensor.params.sigma_range_m = read();
     sensor.params.sigma_leader_m = read();
     Filter filter{Plain(Process(params)), rule_};
@@ -92,11 +120,21 @@ class RobustReplay {
       for (int j = 0; j <= i; ++j) p0(i, j) = read();
     }
     stream_.write(static_cast<std::uint32_t>(filter.reset(x0, p0)));
-    for (std::uint32_t k = 0; k < steps_; ++k) step(filter, sensor);
+    Taker<Filter, Sensor> taker(filter);
+    for (std::uint32_t k = 0; k < steps_; ++k) step(taker, sensor);
   }
 
   template <class Filter, class Sensor>
-  void step(Filter& filter, Sensor& sensor) {
+  float read_age(const InTime<Filter, Sensor>&) {
+    return 0.0f;
+  }
+  template <class Filter, class Sensor>
+  float read_age(const Late<Filter, Sensor>&) {
+    return read();
+  }
+
+  template <class Taker, class Sensor>
+  void step(Taker& taker, Sensor& sensor) {
     const bool measured = stream_.read() != 0;
     const float dt = read();
     Vector<float, 3> input;
@@ -105,13 +143,15 @@ class RobustReplay {
     z(0) = read();
     sensor.params.leader_x_m = read();
     sensor.params.leader_y_m = read();
+    const float age = read_age(taker);
 
-    const Status predicted = filter.predict(dt, input);
+    const Status predicted = taker.predict(dt, input);
     RobustCorrection<float, 1> u(Status::kOk);
-    if (measured) u = filter.update(z, sensor);
+    if (measured) u = taker.update(z, sensor, age);
 
-    for (int i = 0; i < Filter::kStates; ++i) write(filter.x()(i));
-    for (int i = 0; i < Filter::kStates; ++i) {
+    const auto& filter = taker.filter();
+    for (int i = 0; i < Sensor::kStates; ++i) write(filter.x()(i));
+    for (int i = 0; i < Sensor::kStates; ++i) {
       for (int j = 0; j <= i; ++j) write(filter.belief().P(i, j));
     }
     write(u.innovation(0));

@@ -13,18 +13,7 @@ _Params: TypeAlias = dict[str, float]
 
 class _Type(type): ...  # of pybind11
 
-# status.hpp
-
-class Status(metaclass=_Type):
-    ok: ClassVar[Status]
-    not_initialised: ClassVar[Status]
-    not_finite: ClassVar[Status]
-    time_backwards: ClassVar[Status]
-    bad_parameter: ClassVar[Status]
-    not_positive_definite: ClassVar[Status]
-    alpha_too_small: ClassVar[Status]
-    overflow: ClassVar[Status]
-    __members__: ClassVar[dict[str, Status]]
+class _Enum(metaclass=_Type):
     def __init__(self, value: int) -> None: ...
     @property
     def name(self) -> str: ...
@@ -38,6 +27,19 @@ class Status(metaclass=_Type):
     def __getstate__(self) -> int: ...
     def __setstate__(self, state: int, /) -> None: ...
 
+# status.hpp
+
+class Status(_Enum):
+    ok: ClassVar[Status]
+    not_initialised: ClassVar[Status]
+    not_finite: ClassVar[Status]
+    time_backwards: ClassVar[Status]
+    bad_parameter: ClassVar[Status]
+    not_positive_definite: ClassVar[Status]
+    alpha_too_small: ClassVar[Status]
+    overflow: ClassVar[Status]
+    __members__: ClassVar[dict[str, Status]]
+
 class StatusError(ValueError):
     status: Status
 
@@ -45,7 +47,7 @@ def describe(status: Status) -> str: ...
 
 # self_test.hpp
 
-class SelfTestPart(metaclass=_Type):
+class SelfTestPart(_Enum):
     none: ClassVar[SelfTestPart]
     rounding: ClassVar[SelfTestPart]
     expression: ClassVar[SelfTestPart]
@@ -57,18 +59,6 @@ class SelfTestPart(metaclass=_Type):
     update: ClassVar[SelfTestPart]
     interval: ClassVar[SelfTestPart]
     __members__: ClassVar[dict[str, SelfTestPart]]
-    def __init__(self, value: int) -> None: ...
-    @property
-    def name(self) -> str: ...
-    @property
-    def value(self) -> int: ...
-    def __int__(self) -> int: ...
-    def __index__(self) -> int: ...
-    def __eq__(self, other: object, /) -> bool: ...
-    def __ne__(self, other: object, /) -> bool: ...
-    def __hash__(self) -> int: ...
-    def __getstate__(self) -> int: ...
-    def __setstate__(self, state: int, /) -> None: ...
 
 class SelfTestResult(metaclass=_Type):
     def __init__(self, *args: object, **kwargs: object) -> None: ...
@@ -233,23 +223,11 @@ def mahalanobis_interval_defaults(preset: str) -> _Params: ...
 
 # robust/
 
-class Decision(metaclass=_Type):
+class Decision(_Enum):
     accepted: ClassVar[Decision]
     downweighted: ClassVar[Decision]
     rejected: ClassVar[Decision]
     __members__: ClassVar[dict[str, Decision]]
-    def __init__(self, value: int) -> None: ...
-    @property
-    def name(self) -> str: ...
-    @property
-    def value(self) -> int: ...
-    def __int__(self) -> int: ...
-    def __index__(self) -> int: ...
-    def __eq__(self, other: object, /) -> bool: ...
-    def __ne__(self, other: object, /) -> bool: ...
-    def __hash__(self) -> int: ...
-    def __getstate__(self) -> int: ...
-    def __setstate__(self, state: int, /) -> None: ...
 
 class _Kernel(Generic[_Array], metaclass=_Type):
     def __init__(self, /, *args: Any, **kwargs: Any) -> None: ...
@@ -281,32 +259,6 @@ def sigma_points_defaults() -> _Params: ...
 
 # simulation/tracking.hpp
 
-class _TrackDict(TypedDict):
-    position: _Pair
-    velocity: _Pair
-    acceleration: _Pair
-    turn_rate: float
-    wander_m: float
-    wander_period_s: float
-
-class _NoiseDict(TypedDict):
-    range_m: float
-    bearing_rad: float
-    centred: bool
-    dropout: float
-
-class _ScenarioDict(TypedDict):
-    track: Track
-    noise: SensorNoise
-    seed: int
-    first_run: int
-    runs: int
-    steps: int
-    duration_s: float
-    random_start: bool
-    probe_period_s: float
-    budget_m: float
-
 class Track(metaclass=_Type):
     def __init__(
         self,
@@ -327,7 +279,7 @@ def simulate_tracking(
     x0: _F32 | _F64,
     P0: _F32 | _F64,
     sensor: _Sensor[Any],
-    scenario: _ScenarioDict,
+    scenario: Mapping[str, Any],
 ) -> dict[str, npt.NDArray[Any]]: ...
 
 class SensorNoise(metaclass=_Type):
@@ -335,8 +287,8 @@ class SensorNoise(metaclass=_Type):
         self, kind: str, range_m: float, bearing_rad: float, centred: bool, dropout: float
     ) -> None: ...
 
-def track_defaults() -> _TrackDict: ...
-def noise_defaults() -> _NoiseDict: ...
+def track_defaults() -> dict[str, Any]: ...
+def noise_defaults() -> dict[str, Any]: ...
 def noise_mean(kind: str) -> float: ...
 def noise_standard_deviation(kind: str) -> float: ...
 
@@ -472,11 +424,6 @@ class SlatOutage_compass_float64(_SlatOutage[_F64]): ...
 class SlatOutage_unicycle_float32(_SlatOutage[_F32]): ...
 class SlatOutage_unicycle_float64(_SlatOutage[_F64]): ...
 
-class _SlatScenarioDict(TypedDict):
-    params: dict[str, Any]
-    slave: _Params
-    masters: list[_Params]
-
 class SlatScenario(metaclass=_Type):
     def __init__(
         self,
@@ -485,24 +432,11 @@ class SlatScenario(metaclass=_Type):
         masters: Sequence[Mapping[str, float]],
     ) -> None: ...
 
-def slat_scenario_defaults() -> _SlatScenarioDict: ...
+def slat_scenario_defaults() -> dict[str, Any]: ...
 
 # simulation/cooperative.hpp
 
-class _CooperativeDict(TypedDict):
-    sigma_m: float
-    outlier_fraction: float
-    outlier_sigma_m: float
-    degrees_of_freedom: int
-    dt_s: float
-    range_every: int
-    sigma_speed: float
-    sigma_heading: float
-    late_steps: int
-    messages_in_flight: int
-    most_late_steps: int
-
-def cooperative_defaults() -> _CooperativeDict: ...
+def cooperative_defaults() -> dict[str, Any]: ...
 def cooperative_fleet(dt_s: float, steps: int) -> tuple[_F64, _F64]: ...
 def cooperate(
     slave: Any, sensor: Any, scenario: Mapping[str, Any]

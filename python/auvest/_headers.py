@@ -1,4 +1,4 @@
-"""Where the C++ headers are that the package brings."""
+"""Where the C++ headers and the sources of the firmware are that the package brings."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 _PACKAGE = Path(__file__).resolve().parent
+_EIGEN = (Path("/usr/include/eigen3"), Path("/usr/local/include/eigen3"))
 
 
 def get_include() -> str:
@@ -22,17 +23,36 @@ def get_include() -> str:
     return str(installed)
 
 
-def include_folders() -> list[Path]:
-    """Give all folders that a compiler needs; from the sources where auvest is not installed."""
-    installed = _installed()
-    if installed is not None:
-        return [installed]
+def include_folders(*, sources_first: bool = False) -> list[Path]:
+    """Give all folders that a compiler needs.
+
+    Those that were installed with the module, or those of the source tree: of both there may be,
+    and the tree may have been edited since.
+    """
     cpp = _PACKAGE.parents[1] / "cpp"
-    eigen = [Path("/usr/include/eigen3"), Path("/usr/local/include/eigen3")]
-    found = [folder for folder in eigen if (folder / "Eigen" / "Core").is_file()]
-    if not (cpp / "desk").is_dir() or not found:
-        raise FileNotFoundError("auvest has no headers here: install it anew")
-    return [cpp, cpp / "include", found[0]]
+    found = [folder for folder in _EIGEN if (folder / "Eigen" / "Core").is_file()]
+    sources = [cpp, cpp / "include", found[0]] if (cpp / "desk").is_dir() and found else []
+    installed = _installed()
+    if sources and (sources_first or installed is None):
+        return sources
+    if installed is None:
+        what = "Eigen here: install libeigen3-dev" if not found else "headers here: install it anew"
+        raise FileNotFoundError(f"auvest has no {what}")
+    return [installed]
+
+
+def firmware_folder() -> Path:
+    """Give the folder with the sources of the Arduino library and of the simulated board.
+
+    Raises
+    ------
+    FileNotFoundError
+        If they did not come with the package.
+    """
+    for folder in (_PACKAGE.parents[1] / "firmware", _PACKAGE / "firmware"):
+        if (folder / "board" / "board.hpp").is_file():
+            return folder
+    raise FileNotFoundError("auvest has no sources of the firmware here: install it anew")
 
 
 def _installed() -> Path | None:

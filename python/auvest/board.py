@@ -441,8 +441,7 @@ class Board:
         return ValueError(text or "auvest-board ended without a report")
 
     def _pipe(self, name: str) -> IO[bytes]:
-        pipe: IO[bytes] = getattr(self._process, name)
-        return pipe
+        return getattr(self._process, name)
 
     def _close(self) -> None:
         assert self._process is not None

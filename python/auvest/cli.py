@@ -1,15 +1,16 @@
 """The command line ``auvest``: the tree of commands. Each command is a module of its own.
 
-To add one: write ``commands/<verb>_<noun>.py`` with a function ``command``, and put it into the
-table below with the line that stands first in its help and in that of its group. What the module's
-docstring says below its first line is the help, with examples. The module is imported when the
-command is called: ``auvest --help`` waits for none of them.
+To add one: write ``commands/<verb>_<noun>.py`` (``reproduce/<noun>/command.py``) with a function
+``command``, and put it into the table below with the line that stands first in its help and in that
+of its group. What the module's docstring says below its first line is the help, with examples. The
+module is imported when the command is called: ``auvest --help`` waits for none of them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from importlib import import_module
+from inspect import cleandoc
 from typing import Annotated, Any
 
 import typer
@@ -17,60 +18,40 @@ from typer.core import TyperCommand
 
 from auvest.commands.exit_codes import EXIT_CODES
 
-#: Module and first line of help of each command, by the words that call it.
-COMMANDS: Mapping[tuple[str, ...], tuple[str, str]] = {
-    ("capture",): (
-        "commands.capture",
-        "Record what the sketch tracking_loop reports: a CSV file, a figure, a table.",
+#: First line of help of each command, by the words that call it.
+COMMANDS: Mapping[tuple[str, ...], str] = {
+    ("capture",): "Record what the sketch tracking_loop reports: a CSV file, a figure, a table.",
+    ("cost",): (
+        "Measure a filter with your models on the simulated MEGA2560: flash, RAM, stack, cycles."
     ),
-    ("filters",): (
-        "commands.filters",
-        "List the filters: what each takes, and where it runs with the same bits.",
-    ),
-    ("import",): (
-        "commands.import_log",
-        "Turn a published recording into logs for 'auvest replay'.",
-    ),
-    ("replay",): ("commands.replay", "Replay recorded runs through a filter."),
+    ("filters",): "List the filters: what each takes, and where it runs with the same bits.",
+    ("import",): "Turn a published recording into logs for 'auvest replay'.",
+    ("replay",): "Replay recorded runs through a filter.",
     ("simulate", "aukf"): (
-        "commands.simulate_aukf",
-        "Simulate the AUKF paper's scenario and show errors, intervals and consistency.",
+        "Simulate the AUKF paper's scenario and show errors, intervals and consistency."
     ),
-    ("simulate", "slatf"): (
-        "commands.simulate_slatf",
-        "Simulate the SLATF paper's scenario and show errors and consistency.",
-    ),
+    ("simulate", "slatf"): "Simulate the SLATF paper's scenario and show errors and consistency.",
     ("simulate", "mekf"): (
-        "commands.simulate_mekf",
-        "Simulate range-only cooperative localisation and show errors, weights and consistency.",
+        "Simulate range-only cooperative localisation and show errors, weights and consistency."
     ),
     ("reproduce", "aukf"): (
-        "reproduce.aukf.command",
-        "Reproduce the AUKF paper (Deng, Yin, Duan 2019): Figs 1 to 10 and every claim.",
+        "Reproduce the AUKF paper (Deng, Yin, Duan 2019): Figs 1 to 10 and every claim."
     ),
     ("reproduce", "slatf"): (
-        "reproduce.slatf.command",
-        "Reproduce the SLATF paper (Lu, Chen, Liu, Ma, He 2020): Table 1, Figs 2 to 6, all claims.",
+        "Reproduce the SLATF paper (Lu, Chen, Liu, Ma, He 2020): Table 1, Figs 2 to 6, all claims."
     ),
     ("reproduce", "mekf"): (
-        "reproduce.mekf.command",
-        "Reproduce the M-estimation EKF paper (Li, Du, Fan, Chen, Mao, Luo 2020): Figs 5 and 6.",
+        "Reproduce the M-estimation EKF paper (Li, Du, Fan, Chen, Mao, Luo 2020): Figs 5 and 6."
     ),
-    ("reproduce", "intervals"): (
-        "reproduce.intervals.command",
-        "Compare the interval policies at equal mean sampling rate.",
-    ),
+    ("reproduce", "intervals"): "Compare the interval policies at equal mean sampling rate.",
     ("reproduce", "logs"): (
-        "reproduce.logs.command",
-        "Replay the validation recordings and set the errors beside the targets.",
+        "Replay the validation recordings and set the errors beside the targets."
     ),
     ("reproduce", "slat-cases"): (
-        "reproduce.slat_cases.command",
-        "Cases in which SlatfJoint and the IMM earn their place, and by how much.",
+        "Cases in which SlatfJoint and the IMM earn their place, and by how much."
     ),
     ("reproduce", "mrclam6"): (
-        "reproduce.mrclam6.command",
-        "Track real robots that see each other, with one setting for all tracks.",
+        "Track real robots that see each other, with one setting for all tracks."
     ),
 }
 
@@ -80,38 +61,6 @@ app = typer.Typer(
     rich_markup_mode="rich",
     pretty_exceptions_show_locals=False,
     context_settings={"help_option_names": ["-h", "--help"]},
-    help=f"""Estimators for small autonomous underwater vehicles: simulate, reproduce, compare.
-
-Results go to stdout, messages and progress to stderr; --json gives one JSON object on stdout.
-
-First steps:
-
-  auvest simulate aukf               the paper's scenario, a table and a figure
-
-  auvest simulate aukf --help        all its options, with examples
-
-  auvest reproduce aukf              every figure and claim of the paper beside ours
-
-  auvest reproduce intervals         the interval policies at equal sampling rate
-
-  auvest simulate slatf              a slave without communication pings its master
-
-  auvest reproduce slatf             Table 1 and every figure of the paper beside ours
-
-  auvest simulate mekf               ranges with outliers: EKF and robust kernels
-
-  auvest reproduce mekf              the M-estimation EKF paper beside ours
-
-  auvest reproduce logs              real recordings: our filters beside the baselines
-
-  auvest reproduce mrclam6           real robots: SLATF and EKF-SLAT with an IMM master
-
-  auvest replay --help               your own recordings through any filter
-
-  auvest capture --help              record what a board reports, real or simulated
-
-{EXIT_CODES}
-""",
 )
 _GROUPS = {
     "simulate": "Simulate a filter in its scenario, many runs.",
@@ -119,12 +68,21 @@ _GROUPS = {
 }
 
 
-def _lazy(module: str, line: str) -> type[TyperCommand]:
+def _module(words: tuple[str, ...]) -> str:
+    """Name the module of a command."""
+    if words[0] == "reproduce":
+        return f"auvest.reproduce.{words[1].replace('-', '_')}.command"
+    if words == ("import",):
+        return "auvest.commands.import_log"  # no module can be called "import"
+    return f"auvest.commands.{'_'.join(words)}"
+
+
+def _lazy(words: tuple[str, ...], line: str) -> type[TyperCommand]:
     """Make what stands in the tree of commands until the command is called."""
 
     class Lazy(TyperCommand):
         def make_context(self, *arguments: Any, **options: Any) -> Any:
-            found = import_module(f"auvest.{module}")
+            found = import_module(_module(words))
             real = typer.Typer(rich_markup_mode="rich", add_completion=False)
             about = (found.__doc__ or "").partition("\n\n")[2]
             about = about.replace("Examples\n--------\n", "Examples:\n\n")
@@ -140,8 +98,9 @@ def _grow() -> None:
     for name, text in _GROUPS.items():
         branches[(name,)] = typer.Typer(name=name, no_args_is_help=True, help=text)
         app.add_typer(branches[(name,)])
-    for (*group, name), (module, line) in COMMANDS.items():
-        branches[tuple(group)].command(name, cls=_lazy(module, line), help=line)(lambda: None)
+    for words, line in COMMANDS.items():
+        cls = _lazy(words, line)
+        branches[words[:-1]].command(words[-1], cls=cls, help=line)(lambda: None)
 
 
 _grow()
@@ -155,7 +114,6 @@ def _show_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
 def _main(
     show_version: Annotated[
         bool,
@@ -164,4 +122,38 @@ def _main(
         ),
     ] = False,
 ) -> None:
-    pass
+    """Estimators for small autonomous underwater vehicles: simulate, reproduce, compare.
+
+    Results go to stdout, messages and progress to stderr; --json gives one JSON object on stdout.
+
+    First steps:
+
+      auvest simulate aukf               the paper's scenario, a table and a figure
+
+      auvest simulate aukf --help        all its options, with examples
+
+      auvest reproduce aukf              every figure and claim of the paper beside ours
+
+      auvest reproduce intervals         the interval policies at equal sampling rate
+
+      auvest simulate slatf              a slave without communication pings its master
+
+      auvest reproduce slatf             Table 1 and every figure of the paper beside ours
+
+      auvest simulate mekf               ranges with outliers: EKF and robust kernels
+
+      auvest reproduce mekf              the M-estimation EKF paper beside ours
+
+      auvest reproduce logs              real recordings: our filters beside the baselines
+
+      auvest reproduce mrclam6           real robots: SLATF and EKF-SLAT with an IMM master
+
+      auvest replay --help               your own recordings through any filter
+
+      auvest cost my_models.hpp          what your models take on the chip, and their bits there
+
+      auvest capture --help              record what a board reports, real or simulated
+    """
+
+
+app.callback(help=f"{cleandoc(_main.__doc__ or '')}\n\n{EXIT_CODES}\n")(_main)

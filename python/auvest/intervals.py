@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import KW_ONLY, asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from auvest import _core
-from auvest._arguments import as_kind, as_number, require_range
+from auvest._arguments import as_number, require_range
+from auvest._fields import Checked, choice, positive
 
 if TYPE_CHECKING:
     from auvest._core import _Interval
@@ -16,8 +17,13 @@ _BUDGET = _core.covariance_budget_defaults()
 _LAW = {name: _core.mahalanobis_interval_defaults(name) for name in ("figure3", "table1")}
 
 
+def _of_preset() -> Any:
+    """Take a number; None stands for that of the preset."""
+    return field(default=None)
+
+
 @dataclass(frozen=True, kw_only=True)
-class FixedInterval:
+class FixedInterval(Checked):
     """A constant sampling interval: with it an AUKF is a UKF.
 
     Parameters
@@ -26,14 +32,11 @@ class FixedInterval:
         Interval in seconds, positive.
     """
 
-    interval_s: float = _FIXED["interval_s"]
-
-    def __post_init__(self) -> None:
-        _set_positive(self, "interval_s")
+    interval_s: float = positive(_FIXED["interval_s"])
 
 
 @dataclass(frozen=True, kw_only=True)
-class CovarianceBudget:
+class CovarianceBudget(Checked):
     """The largest interval after which the predicted position is still within an error budget.
 
     Not in the paper. It needs no reference track.
@@ -48,18 +51,18 @@ class CovarianceBudget:
         Interval before the first update, s.
     """
 
-    position_sigma_m: float = _BUDGET["position_sigma_m"]
-    min_s: float = _BUDGET["min_s"]
-    max_s: float = _BUDGET["max_s"]
-    initial_s: float = _BUDGET["initial_s"]
+    position_sigma_m: float = positive(_BUDGET["position_sigma_m"])
+    min_s: float = positive(_BUDGET["min_s"])
+    max_s: float = positive(_BUDGET["max_s"])
+    initial_s: float = positive(_BUDGET["initial_s"])
 
     def __post_init__(self) -> None:
-        _set_positive(self, "position_sigma_m", "min_s", "max_s", "initial_s")
+        super().__post_init__()
         _check_limits(self)
 
 
-@dataclass(frozen=True, init=False)
-class MahalanobisInterval:
+@dataclass(frozen=True)
+class MahalanobisInterval(Checked):
     """The paper's interval law, Eqs. (7) to (12).
 
     ``M(k) = d_t^2 / (d_e^2 + gamma1)`` (7), ``T(k) = (1 - tau) scale T(k-1) + tau M(k) max_s`` (8),
@@ -93,54 +96,28 @@ class MahalanobisInterval:
         If an argument lies outside its range.
     """
 
-    preset: Literal["figure3", "table1"]
-    initial_s: float
-    min_s: float
-    max_s: float
-    tau0: float
-    scale: float
-    epsilon: float
-    gamma1_m2: float
-    gamma2: float
-    ratio_max: float
-    tau_min: float
-    tau_max: float
+    preset: Literal["figure3", "table1"] = choice("figure3", "table1")
+    _: KW_ONLY
+    initial_s: float = _of_preset()
+    min_s: float = _of_preset()
+    max_s: float = _of_preset()
+    tau0: float = _of_preset()
+    scale: float = _of_preset()
+    epsilon: float = _of_preset()
+    gamma1_m2: float = _of_preset()
+    gamma2: float = _of_preset()
+    ratio_max: float = _of_preset()
+    tau_min: float = _of_preset()
+    tau_max: float = _of_preset()
 
-    def __init__(
-        self,
-        preset: Literal["figure3", "table1"] = "figure3",
-        *,
-        initial_s: float | None = None,
-        min_s: float | None = None,
-        max_s: float | None = None,
-        tau0: float | None = None,
-        scale: float | None = None,
-        epsilon: float | None = None,
-        gamma1_m2: float | None = None,
-        gamma2: float | None = None,
-        ratio_max: float | None = None,
-        tau_min: float | None = None,
-        tau_max: float | None = None,
-    ) -> None:
-        as_kind("preset", preset, ("figure3", "table1"))
-        given = {
-            "initial_s": initial_s,
-            "min_s": min_s,
-            "max_s": max_s,
-            "tau0": tau0,
-            "scale": scale,
-            "epsilon": epsilon,
-            "gamma1_m2": gamma1_m2,
-            "gamma2": gamma2,
-            "ratio_max": ratio_max,
-            "tau_min": tau_min,
-            "tau_max": tau_max,
-        }
-        object.__setattr__(self, "preset", preset)
-        for name, value in given.items():
-            chosen = _LAW[preset][name] if value is None else as_number(name, value)
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name, value in _LAW[self.preset].items():
+            given = getattr(self, name)
+            chosen = value if given is None else as_number(name, given)
             object.__setattr__(self, name, chosen)
-        _set_positive(self, "initial_s", "min_s", "max_s", "epsilon", "gamma1_m2", "gamma2")
+        for name in ("initial_s", "min_s", "max_s", "epsilon", "gamma1_m2", "gamma2"):
+            as_number(name, getattr(self, name), "positive")
         _check_limits(self)
         if not 0 <= self.scale <= 1:
             raise ValueError(f"scale must lie in 0..1, not {self.scale}")
@@ -168,15 +145,9 @@ def core_interval(policy: IntervalPolicy, dtype: str) -> _Interval:
         CovarianceBudget: core.covariance_budget,
     }[type(policy)]
     try:
-        interval: _Interval = build(params)
+        return build(params)
     except _core.StatusError as error:
         raise ValueError(f"{policy} does not suit {dtype}: {error}") from None
-    return interval
-
-
-def _set_positive(policy: Any, *names: str) -> None:
-    for name in names:
-        object.__setattr__(policy, name, as_number(name, getattr(policy, name), "positive"))
 
 
 def _check_limits(policy: CovarianceBudget | MahalanobisInterval) -> None:

@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from auvest import _core
-from auvest._arguments import as_array, as_integer, as_kind, as_number, require_range
+from auvest._arguments import as_array, as_kind, require_range
+from auvest._fields import Checked, integer, positive
 
 if TYPE_CHECKING:
     from auvest._core import _Kernel
@@ -19,10 +20,20 @@ _REJECTIONS = _core.robust_update_defaults()["rejections"]
 
 
 @dataclass(frozen=True)
-class Kernel:
-    """What the kernels have in common; not for direct use."""
+class Kernel(Checked):
+    """What the kernels have in common; not for direct use.
+
+    Thresholds are positive and in ascending order; inf means that what lies beyond is not.
+    """
 
     name: ClassVar[str]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        params = asdict(self)
+        if [*params.values()] != sorted(params.values()):
+            given = ", ".join(f"{name}={value}" for name, value in params.items())
+            raise ValueError(f"{' <= '.join(params)} is required, not {given}")
 
     def weight(self, t: npt.ArrayLike) -> npt.NDArray[np.float64]:
         """Weight, ``psi(t) / t`` in 0..1, of residuals ``t`` (K,) in multiples of sigma."""
@@ -34,24 +45,7 @@ class Kernel:
 
     def _map(self, function: str, t: npt.ArrayLike) -> npt.NDArray[np.float64]:
         residuals = as_array("t", t, (None,), np.dtype(np.float64))
-        values: npt.NDArray[np.float64] = getattr(core_kernel(self, "float64"), function)(residuals)
-        return values
-
-    def _check_ascending(self, *names: str) -> None:
-        """Thresholds are positive and in ascending order; inf means that what lies beyond is not.
-
-        Raises
-        ------
-        ValueError, TypeError
-            If one is not.
-        """
-        for name in names:
-            value = as_number(name, getattr(self, name), "positive", infinite=True)
-            object.__setattr__(self, name, value)
-        values = [getattr(self, name) for name in names]
-        if values != sorted(values):
-            given = ", ".join(f"{name}={value}" for name, value in zip(names, values, strict=True))
-            raise ValueError(f"{' <= '.join(names)} is required, not {given}")
+        return getattr(core_kernel(self, "float64"), function)(residuals)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,10 +66,7 @@ class Huber(Kernel):
     """
 
     name: ClassVar[str] = "huber"
-    k: float = _DEFAULTS["huber"]["k"]
-
-    def __post_init__(self) -> None:
-        self._check_ascending("k")
+    k: float = positive(_DEFAULTS["huber"]["k"], infinite=True)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,12 +80,12 @@ class Hampel(Kernel):
     """
 
     name: ClassVar[str] = "hampel"
-    a: float = _DEFAULTS["hampel"]["a"]
-    b: float = _DEFAULTS["hampel"]["b"]
-    c: float = _DEFAULTS["hampel"]["c"]
+    a: float = positive(_DEFAULTS["hampel"]["a"], infinite=True)
+    b: float = positive(_DEFAULTS["hampel"]["b"], infinite=True)
+    c: float = positive(_DEFAULTS["hampel"]["c"], infinite=True)
 
     def __post_init__(self) -> None:
-        self._check_ascending("a", "b", "c")
+        super().__post_init__()
         if self.c == float("inf") and self.b != float("inf"):
             raise ValueError(f"c must be finite where b is, not c={self.c} with b={self.b}")
 
@@ -110,15 +101,12 @@ class Igg(Kernel):
     """
 
     name: ClassVar[str] = "igg"
-    k0: float = _DEFAULTS["igg"]["k0"]
-    k1: float = _DEFAULTS["igg"]["k1"]
-
-    def __post_init__(self) -> None:
-        self._check_ascending("k0", "k1")
+    k0: float = positive(_DEFAULTS["igg"]["k0"], infinite=True)
+    k1: float = positive(_DEFAULTS["igg"]["k1"], infinite=True)
 
 
 @dataclass(frozen=True, kw_only=True)
-class RejectionStreak:
+class RejectionStreak(Checked):
     """Recovery from lock-out: a streak of rejections widens the position's covariance.
 
     A rejection counts 4 up, or 7 if it repeats the innovation of a recent one seen along the same
@@ -131,10 +119,7 @@ class RejectionStreak:
         Rejections in a row that it takes if none repeats another, 1..60.
     """
 
-    rejections: int = _REJECTIONS
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "rejections", as_integer("rejections", self.rejections, 1, 60))
+    rejections: int = integer(_REJECTIONS, 1, 60)
 
 
 KernelName: TypeAlias = Literal["igg", "huber", "hampel", "unit"]
@@ -159,5 +144,4 @@ def core_kernel(kernel: Kernel, dtype: str) -> _Kernel[Any]:
     """Build the core's kernel in this precision."""
     params = asdict(kernel)
     require_range({k: v for k, v in params.items() if v != float("inf")}, dtype)
-    built: _Kernel[Any] = getattr(getattr(_core, f"Kernel_{dtype}"), kernel.name)(params)
-    return built
+    return getattr(getattr(_core, f"Kernel_{dtype}"), kernel.name)(params)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -82,8 +83,7 @@ def track_figure(
         )  # fmt: skip
         axes.plot(steps, estimate[:, row] - truth[:, row], "--", color=colour, linewidth=1.8)
         axes.axhline(0.0, color=BLACK, linewidth=1.6, zorder=1)
-        axes.set_ylabel(f"{name} off the reference / m")
-        style(axes)
+        style(axes, ylabel=f"{name} off the reference / m")
     axes.set_xlabel("step")
     style(plane)
     legend_below(figure, plane, columns=4)
@@ -94,13 +94,11 @@ def step_figure(
     lines: Sequence[Line], *, title: str, ylabel: str, xlabel: str = "step", zero: bool = False
 ) -> Figure:
     """Draw curves over the step number, or over ``Line.x`` where a line has one."""
-    figure = new_figure((6.6, 4.4), title)
-    axes = figure.add_subplot()
+    figure, axes = new_axes((6.6, 4.4), title)
     _draw_lines(axes, lines)
-    axes.set(xlabel=xlabel, ylabel=ylabel)
     if zero:
         axes.axhline(0.0, color=BLACK, linewidth=0.6, zorder=1)
-    style(axes)
+    style(axes, xlabel=xlabel, ylabel=ylabel)
     legend_below(figure, axes, columns=2)
     return figure
 
@@ -114,13 +112,10 @@ def error_figure(
     bottom = figure.add_subplot(2, 1, 2, sharex=top)
     _draw_lines(top, runs)
     top.axhline(0.0, color=BLACK, linewidth=0.6, zorder=1)
-    top.set_ylabel(f"{axis} error, one run / m")
     top.tick_params(labelbottom=False)
     _draw_lines(bottom, spread)
-    bottom.set(xlabel="step", ylabel=f"{axis} error, rms / m")
-    bottom.set_ylim(bottom=0.0)
-    style(top)
-    style(bottom)
+    style(top, ylabel=f"{axis} error, one run / m")
+    style(bottom, xlabel="step", ylabel=f"{axis} error, rms / m", ylim=(0.0, None))
     legend_below(figure, bottom, columns=3)
     return figure
 
@@ -166,9 +161,7 @@ def simulation_figure(
 
     pace = figure.add_subplot(grid[0, 1])
     _draw_lines(pace, intervals)
-    pace.set(xlabel="step", ylabel="T / s")
-    pace.set_ylim(bottom=0.0)
-    style(pace)
+    style(pace, xlabel="step", ylabel="T / s", ylim=(0.0, None))
     pace.set_title("sampling interval", loc="left")
     _legend_above(pace)
 
@@ -180,8 +173,7 @@ def simulation_figure(
         )
         _draw_lines(axes, [band], band_label="±3 sigma of the filter")
         axes.axhline(0.0, color=BLACK, linewidth=0.6, zorder=1)
-        axes.set_ylabel(f"{name} error / m")
-        style(axes)
+        style(axes, ylabel=f"{name} error / m")
         if row == 0:
             axes.set_title("error, one run", loc="left")
             _legend_above(axes)
@@ -227,9 +219,7 @@ def capture_figure(
         plane.plot(*truth.T, "-", color=BLACK, linewidth=1.2, label="truth")
     plane.plot(*estimate.T, "--", color=BLUE, linewidth=1.8, label="estimate")
     plane.plot(*station, "^", color=GREEN, markersize=8, label="station", linestyle="none")
-    plane.set(xlabel="x / m", ylabel="y / m")
-    plane.set_aspect("equal", adjustable="datalim")
-    style(plane)
+    style_plane(plane)
     plane.set_title("tracks", loc="left")
     _legend_inside(plane)
 
@@ -242,8 +232,7 @@ def capture_figure(
     for row, (name, label, values) in enumerate(rows):
         axes = figure.add_subplot(grid[row, 1])
         axes.plot(time_s, values, ".-", color=BLUE, linewidth=1.2, markersize=3.5)
-        axes.set_ylabel(label)
-        axes.set_ylim(bottom=0.0)
+        style(axes, ylabel=label, ylim=(0.0, None))
         axes.set_title(name, loc="left")
         axes.title.set_fontsize(10.5)
         if row == 2:
@@ -254,7 +243,6 @@ def capture_figure(
             axes.set_xlabel("time / s")
         else:
             axes.tick_params(labelbottom=False)
-        style(axes)
     return figure
 
 
@@ -293,15 +281,11 @@ def slave_figure(
         plane.plot(masters[:, n, 0], masters[:, n, 1], color=VERMILION, label=label)
     plane.plot(truth[:, 0], truth[:, 1], color=BLACK, linewidth=1.6, label="slave, truth")
     plane.plot(estimate[:, 0], estimate[:, 1], "--", color=BLUE, label="slave, one run")
-    plane.set(xlabel="x / m", ylabel="y / m")
     axes.plot(time_s, rms_m, color=BLACK, linewidth=1.6, label="rms, all runs")
     axes.plot(time_s, error_m, "--", color=BLUE, label="one run")
     axes.plot(time_s, sigma_m, ":", color=BLUE, label="claimed sigma, that run")
-    axes.set(xlabel="time / s", ylabel="position error / m")
-    axes.set_ylim(bottom=0)
-    for one in (plane, axes):
-        style(one)
-        one.legend(fontsize=8)
+    style(plane, legend=8, xlabel="x / m", ylabel="y / m")
+    style(axes, legend=8, xlabel="time / s", ylabel="position error / m", ylim=(0, None))
     return figure
 
 
@@ -318,8 +302,31 @@ def new_figure(size: tuple[float, float], title: str) -> Figure:
     return figure
 
 
-def style(axes: Axes) -> None:
-    """Give axes the grid and the sizes that all our figures have."""
+def new_axes(size: tuple[float, float], title: str) -> tuple[Figure, Axes]:
+    """Make a figure of that size in inches with axes in it."""
+    figure = new_figure(size, title)
+    return figure, figure.add_subplot()
+
+
+def style(axes: Axes, *, title: str = "", legend: float | None = None, **labels: Any) -> None:
+    """Give axes the grid and the sizes that all our figures have, and finish them.
+
+    Parameters
+    ----------
+    axes : Axes
+        What to draw is in them already.
+    title : str
+        Above them, to the left.
+    legend : float, optional
+        Size of the letters of a legend; default: none.
+    **labels
+        What ``axes.set`` takes: labels, limits, aspect.
+    """
+    axes.set(**labels)
+    if title:
+        axes.set_title(title, fontsize=9.5, loc="left")
+    if legend is not None:
+        axes.legend(fontsize=legend)
     axes.grid(True, color="#dddddd", linewidth=0.6)
     axes.set_axisbelow(True)
     for side in ("top", "right"):
@@ -327,6 +334,12 @@ def style(axes: Axes) -> None:
     for label in (axes.xaxis.label, axes.yaxis.label):
         label.set_fontsize(9.5)
     axes.tick_params(labelsize=9)
+
+
+def style_plane(axes: Axes) -> None:
+    """Style axes in which one metre is as long along x as along y."""
+    axes.set_aspect("equal", adjustable="datalim")
+    style(axes, xlabel="x / m", ylabel="y / m")
 
 
 def legend_below(figure: Figure, axes: Axes, columns: int) -> None:
@@ -385,8 +398,7 @@ def _draw_tracks(
     axes.plot(truth[:, 0], truth[:, 1], "-", color=BLACK, linewidth=1.6, label="reference = truth")
     axes.plot(estimate[:, 0], estimate[:, 1], "--", color=colour, linewidth=1.8, label=label)
     axes.plot(*station, "^", color=GREEN, markersize=8, label="station and start", linestyle="none")
-    axes.set(xlabel="x / m", ylabel="y / m")
-    axes.set_aspect("equal", adjustable="datalim")
+    style_plane(axes)
 
 
 def pair(x: Floats, y: Floats) -> Floats:

@@ -89,13 +89,10 @@ FILTERS: dict[str, Filter] = {
     for name, cls, title, family, where in (
         ("ekf", "Ekf", "EKF", "gaussian", {"replay": True, **_EVERYWHERE}),
         ("ukf", "Ukf", "UKF", "gaussian", {"replay": True, **_EVERYWHERE}),
-        ("ckf", "Ckf", "CKF", "gaussian", {"replay": True, "chip": True, "parity": True}),
+        ("ckf", "Ckf", "CKF", "gaussian", {"replay": True, **_EVERYWHERE}),
         ("aukf", "Aukf", "AUKF", "gaussian", {"replay": True, **_EVERYWHERE}),
         ("robust-ekf", "RobustEkf", "robust EKF", "gaussian", {"replay": True, **_EVERYWHERE}),
-        (
-            "robust-ukf", "RobustUkf", "robust UKF", "gaussian",
-            {"replay": True, "chip": True, "parity": True},
-        ),
+        ("robust-ukf", "RobustUkf", "robust UKF", "gaussian", {"replay": True, **_EVERYWHERE}),
         ("slatf1", "Slatf", "SLATF 1.0", "slat", {**_EVERYWHERE, "note": _IMM_TOO_LARGE}),
         ("slatf2", "Slatf", "SLATF 2.0", "slat", {**_EVERYWHERE, "note": _IMM_TOO_LARGE}),
         ("slatf-joint", "SlatfJoint", "SLATF, joint", "slat", _EVERYWHERE),

@@ -43,8 +43,7 @@ class Result:
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
         if name not in self.columns:
             raise KeyError(self._no_column(name))
-        column: npt.NDArray[Any] = self.__dict__[name]
-        return column
+        return self.__dict__[name]
 
     if not TYPE_CHECKING:  # checkers of types would take any name for a column
 

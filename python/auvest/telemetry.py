@@ -125,6 +125,5 @@ def _number(name: str, cell: str) -> float:
     if cell == "":
         return math.nan
     if name not in _DECIMAL and _BITS.fullmatch(cell):
-        value: float = struct.unpack(">f", bytes.fromhex(cell))[0]
-        return value
+        return struct.unpack(">f", bytes.fromhex(cell))[0]
     return math.nan if cell == "ovf" else float(cell)

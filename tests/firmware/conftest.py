@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from firmware import package, sketch
+from auvest.firmware import package, sketch
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -37,7 +37,7 @@ def build_sketch(library, tmp_path_factory):
     """Return a function that compiles a sketch: a folder, or the source of one.
 
     All share one output folder, so Arduino's core is compiled once. The options are those of
-    `firmware.sketch.compile_sketch`.
+    `auvest.firmware.sketch.compile_sketch`.
     """
     outputs = tmp_path_factory.mktemp("sketches")
 

@@ -1,25 +1,25 @@
 """The C++ standard headers for avr-gcc: what they say is what the real library says."""
 
 import subprocess
+from pathlib import Path
 
 import pytest
 
-from firmware import package
-
+ROOT = Path(__file__).resolve().parents[2]
 AVR = ("-c", "-mmcu=atmega2560", "-std=gnu++11")
 STRICT = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wdouble-promotion", "-Werror")
-AVR_STD = package.ROOT / "firmware" / "avr_std"
+AVR_STD = ROOT / "firmware" / "avr_std"
 HEADERS = sorted(path.name for path in AVR_STD.iterdir())
 HOST_ONLY = {"auvest/math/simd.hpp", "auvest/particles/simd_lanes.hpp"}  # they need xsimd
 PUBLIC = sorted(
     {
-        path.relative_to(package.ROOT / "cpp" / "include").as_posix()
-        for path in (package.ROOT / "cpp" / "include").rglob("*.hpp")
+        path.relative_to(ROOT / "cpp" / "include").as_posix()
+        for path in (ROOT / "cpp" / "include").rglob("*.hpp")
     }
     - HOST_ONLY
 )
 OUR_PATHS = (f"-I{AVR_STD}",)
-AUVEST_PATHS = (f"-I{package.ROOT / 'cpp' / 'include'}", *OUR_PATHS, "-I/usr/include/eigen3")
+AUVEST_PATHS = (f"-I{ROOT / 'cpp' / 'include'}", *OUR_PATHS, "-I/usr/include/eigen3")
 
 # Prints what a standard library says and does. Compiled twice on the host: once with its own
 # library, once with ours (-nostdinc++ hides the other).

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from firmware import package, sketch
+import auvest
+from auvest.firmware import sketch
 
 EMPTY = "void setup() {}\nvoid loop() {}\n"
 
@@ -303,8 +304,8 @@ def test_command_line(library, tmp_path, root):
     (tmp_path / "s").mkdir()
     (tmp_path / "s" / "s.ino").write_text('static_assert(N == 3, "");\n' + EMPTY)
     command = [
-        sys.executable, "-m", "firmware.sketch", tmp_path / "s", "--library", library, "--output",
-        tmp_path / "out", "--define", "N=3", "--warnings", "all",
+        sys.executable, "-m", "auvest.firmware.sketch", tmp_path / "s", "--library", library,
+        "--output", tmp_path / "out", "--define", "N=3", "--warnings", "all",
     ]  # fmt: skip
     done = subprocess.run(command, capture_output=True, text=True, cwd=root)
     assert done.returncode == 0, done.stderr
@@ -317,11 +318,11 @@ def test_command_line(library, tmp_path, root):
     assert "'N' is not NAME=VALUE" in done.stderr
     done = subprocess.run([*command, "--define", "N=4"], capture_output=True, text=True, cwd=root)
     assert done.returncode == 1
-    assert done.stderr.startswith("firmware.sketch: s does not compile")
+    assert done.stderr.startswith("auvest.firmware.sketch: s does not compile")
 
 
 def test_package_command_line(tmp_path, root):
-    command = [sys.executable, "-m", "firmware.package", "--output", tmp_path / "out"]
+    command = [sys.executable, "-m", "auvest.firmware.package", "--output", tmp_path / "out"]
     done = subprocess.run(command, capture_output=True, text=True, cwd=root)
     assert done.returncode == 0, done.stderr
-    assert Path(done.stdout.strip()) == tmp_path / "out" / f"auvest-{package.version()}.zip"
+    assert Path(done.stdout.strip()) == tmp_path / "out" / f"auvest-{auvest.__version__}.zip"

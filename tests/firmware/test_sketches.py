@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from auvest import ConstantAcceleration, RangeBearing, Ukf
+from auvest.firmware.sketch import SketchError
 from auvest.scenarios import paper_aukf
 from auvest.scenarios.tracking import Scenario, simulate
 from firmware import replay_record
-from firmware.sketch import SketchError
 
 pytest_plugins = ["board_support"]
 

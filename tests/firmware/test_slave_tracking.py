@@ -15,9 +15,9 @@ import pytest
 from auvest import _core, telemetry
 from auvest.board import PinChange, Report, SerialLine
 from auvest.commands.capture import TRIGGER_PIN
+from auvest.firmware.sketch import SketchError
 from firmware.parity.slatf import MASTER, READING, SLAVE, Record, World, paper_world
 from firmware.parity.targets import SLATF_TARGETS
-from firmware.sketch import SketchError
 
 pytest_plugins = ["board_support"]
 

@@ -31,6 +31,8 @@ _KERNELS = {Unit: 0, Huber: 1, Hampel: 2, Igg: 3}
 STEP = np.dtype(
     [("measured", "<u4"), ("dt", "<f4"), ("motion", "<f4", 3), ("z", "<f4"), ("leader", "<f4", 2)]
 )
+#: Where measurements are late.
+LATE_STEP = np.dtype([*STEP.descr, ("age", "<f4")])
 
 
 def trace_type(states: int) -> np.dtype:
@@ -69,6 +71,7 @@ class RobustRecord:
     rejections: int = 6
     residual: str = "innovation"
     filter: type[GaussianFilter] = RobustEkf
+    late_s: float = 0.0
     x0: tuple[float, ...] = (0.0, 0.0)
     P0: np.ndarray = field(default_factory=lambda: np.eye(2, dtype=np.float32))
 
@@ -80,6 +83,7 @@ class RobustRecord:
         """The record as the replay programs read it."""
         kind = 2 if isinstance(self.process, Odometry) else 1 if self.process.heading_bias else 0
         kind += 256 * self.filter._linearisation
+        kind += 65536 * (self.late_s > 0)
         thresholds = [*asdict(self.kernel).values(), 1.0, 2.0, 3.0][:3]
         parameters = [v for k, v in asdict(self.process).items() if not isinstance(v, bool)]
         sensor = [self.sensor.sigma_range_m, self.sensor.sigma_leader_m]
@@ -108,6 +112,7 @@ class RobustRecord:
             kernel=self.kernel,
             recovery=recovery,
             residual=self.residual,
+            late_s=self.late_s,
             dtype="float32",
         )
         trace = np.zeros(len(self.steps), trace_type(self.states))
@@ -115,7 +120,10 @@ class RobustRecord:
         for step, row in zip(self.steps, trace, strict=True):
             row["predict"] = _status(lambda s=step: f.predict(float(s["dt"]), s["motion"]), step)
             if step["measured"]:
-                row["update"] = _status(lambda s=step: f.update(s["z"], self._sensor(s)), step)
+                age = {"age_s": float(step["age"])} if self.late_s > 0 else {}
+                row["update"] = _status(
+                    lambda s=step, a=age: f.update(s["z"], self._sensor(s), **a), step
+                )
                 if row["update"] == 0:
                     r = f.report
                     for name in ("innovation", "S", "standardised", "weight"):
@@ -165,6 +173,20 @@ def cruise(steps: int, seed: int, *, scale: float = 1.0, odometry: bool = False)
     z = np.hypot(*(scale * position - rows["leader"]).T) + scale * rng.standard_normal(steps)
     rows["z"] = z + scale * np.where(rng.random(steps) < 1 / 6, rng.normal(0, 25, steps), 0.0)
     rows["measured"] = np.arange(steps) % 5 % 2 == 0
+    return rows
+
+
+def late() -> np.ndarray:
+    """The same, but every third range is told two, three or four seconds after it was measured."""
+    in_time = cruise(200, 14)
+    rows = np.zeros(len(in_time), LATE_STEP)
+    for name in STEP.names:
+        rows[name] = in_time[name]
+    for k in range(6, len(rows), 3):
+        age = 2 + k % 3 + k % 2
+        rows["measured"][k], rows["age"][k] = 1, age
+        rows["z"][k], rows["leader"][k] = in_time["z"][k - age], in_time["leader"][k - age]
+    rows["age"][30] = rows["age"][90] = 1000.0
     return rows
 
 
@@ -221,6 +243,7 @@ def all_records() -> list[RobustRecord]:
                 ),
             )
         ),
+        RobustRecord("robust-late", late(), late_s=6.0, kernel=Hampel()),
         RobustRecord("robust-refusals", refusals()),
         RobustRecord(
             "robust-far",

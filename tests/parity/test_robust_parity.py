@@ -42,6 +42,8 @@ def test_the_records_reach_what_they_are_for(robust_expected):
     wanted = {int(s) for s in (Status.ok, Status.not_finite, Status.time_backwards)}
     assert wanted <= {int(s) for s in refused["predict"]}
     assert {int(Status.ok), int(Status.not_finite)} <= {int(s) for s in refused["update"]}
+    late = robust_expected["robust-late"]
+    assert np.flatnonzero(late["update"] == int(Status.time_backwards)).tolist() == [30, 90]
     weights = igg["weight"].view(np.float32)
     assert ((weights > 0) & (weights < 1)).any()
     for before, after in pairwise(refused):

@@ -1,5 +1,6 @@
 """The wheel and the sdist: what they contain, and that the wheel works outside the source tree."""
 
+import json
 import os
 import re
 import subprocess
@@ -42,10 +43,12 @@ def test_wheel_contents(wheel):
     package = [name for name in names if ".dist-info/" not in name]
     assert {"auvest/__init__.py", "auvest/_core.pyi", "auvest/py.typed"} <= set(package)
     assert [name for name in package if re.fullmatch(r"auvest/_core\..*\.so", name)]
-    # No tests, no sources in C++, no caches: only the package and its headers.
+    # No tests, no caches; C++ only where it is compiled from: the headers, library and board.
     assert not [name for name in package if not name.startswith("auvest/")]
-    python = [name for name in package if not name.startswith("auvest/include/")]
-    assert not [name for name in python if re.search(r"test|\.[ch]pp$|__pycache__", name)]
+    assert not [name for name in package if re.search(r"\btests?\b|__pycache__", name)]
+    sources = {name.rpartition("/")[0] for name in package if re.search(r"\.([ch]pp|S|ino)$", name)}
+    brought = ("include", "firmware/library", "firmware/avr_std", "firmware/board")
+    assert all(folder.startswith(tuple(f"auvest/{part}" for part in brought)) for folder in sources)
     headers = [name.split("/")[2] for name in package if name.startswith("auvest/include/")]
     assert set(headers) == {"Eigen", "auvest", "desk"}
 
@@ -94,6 +97,38 @@ def test_load_models_from_an_installed_wheel(wheel, root, tmp_path, run):
     printed = run(python, "-c", code, env=environment)
     assert printed.startswith(str(tmp_path / "venv"))
     assert len(list((tmp_path / "cache").glob("*.so"))) == 1
+
+
+def test_wheel_ships_what_firmware_is_made_from(wheel, root):
+    with zipfile.ZipFile(wheel) as archive:
+        shipped = {name: archive.read(name) for name in archive.namelist()}
+    for folder in ("library", "avr_std", "board", "cost"):
+        paths = [path for path in (root / "firmware" / folder).rglob("*") if path.is_file()]
+        assert paths
+        for path in paths:
+            assert shipped[f"auvest/firmware/{path.relative_to(root / 'firmware')}"] == (
+                path.read_bytes()
+            )
+    assert shipped["auvest/firmware/LICENSE"] == (root / "LICENSE").read_bytes()
+
+
+@pytest.mark.skipif("AUVEST_SLOW_TESTS" not in os.environ, reason="AUVEST_SLOW_TESTS is not set")
+def test_cost_from_an_installed_wheel(wheel, root, tmp_path, run):
+    """In an empty environment: the library is packed and the board built from what it brings."""
+    run(sys.executable, "-m", "venv", tmp_path / "venv")
+    python = tmp_path / "venv" / "bin" / "python"
+    run(python, "-m", "pip", "install", "--quiet", wheel)
+    (tmp_path / "my_models.hpp").write_bytes((root / "cpp/examples/my_models.hpp").read_bytes())
+    environment = {
+        "PATH": f"{tmp_path / 'venv' / 'bin'}:{os.environ['PATH']}",
+        "HOME": str(tmp_path),
+        "AUVEST_CACHE": str(tmp_path / "cache"),
+    }
+    command = ("auvest", "cost", tmp_path / "my_models.hpp", "--filter", "aukf", "--json")
+    printed = json.loads(run(*command, env=environment, cwd=tmp_path))
+    assert printed["same_bits"] is True
+    assert printed["flash_bytes"] > printed["flash_above_empty_bytes"] > 10_000
+    assert list((tmp_path / "cache").glob("auvest-board-*"))
 
 
 def test_wheel_outside_the_source_tree(wheel, declared_version, tmp_path, run):

@@ -178,10 +178,14 @@ def test_a_session_ends_with_what_happened(
     assert end.value.exit_code == 130
     assert "interrupted: 2 of 3 are kept" in capsys.readouterr().err
     empty = session()
-    assert empty.run(stopped, None) is None
+    assert empty.run_some(stopped, None) is None
     with pytest.raises(typer.Exit) as end:
         empty.nothing_done()
     assert end.value.exit_code == 130
+    with pytest.raises(typer.Exit) as end:
+        empty.run(stopped, None)
+    assert end.value.exit_code == 130
+    assert capsys.readouterr().err.count("no run was done") == 2
 
 
 @dataclass

@@ -686,3 +686,9 @@ def test_defaults_are_those_of_the_core() -> None:
     assert fresh().lanes == "scalar"
     assert Slatf(START, CERTAIN, dtype="float32").lanes == available_lanes()[-1]
     assert "masters=2" in repr(fresh())
+
+
+@pytest.mark.parametrize("kind", [Slatf, SlatfJoint, EkfSlat, DeadReckoning])
+def test_a_parameter_that_the_filter_does_not_have_is_refused_by_name(kind):
+    with pytest.raises(TypeError, match=rf"{kind.__name__}.*unexpected keyword argument 'gates'"):
+        kind([0, 0], np.eye(2), gates=9.0)

@@ -78,7 +78,7 @@ def test_an_unknown_name_is_refused():
 @pytest.mark.parametrize("words", COMMANDS)
 def test_each_command_has_its_line_in_its_group_and_on_top_of_its_help(words, monkeypatch):
     monkeypatch.setenv("COLUMNS", "200")
-    (*group, name), (_, line) = words, COMMANDS[words]
+    (*group, name), line = words, COMMANDS[words]
     listed = CliRunner().invoke(app, [*group, "--help"])
     assert f" {name} " in listed.stdout
     assert line in listed.stdout

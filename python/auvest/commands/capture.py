@@ -23,7 +23,7 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import typer
@@ -40,6 +40,9 @@ from auvest.scenarios import paper_aukf
 from auvest.scenarios.paper_aukf import observed_positions
 from auvest.scenarios.tracking import Noise, Track
 from auvest.telemetry import LineError, Reader, Row
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 #: The pin that the sketch triggers its sonar with: D8 of an Arduino MEGA2560.
 TRIGGER_PIN = "PORTH5"
@@ -309,11 +312,10 @@ def command(
 
     values = measures(recording, simulated=simulator is not None)
     source = settings["source"]
-    files = {"record": path}
+    session.files["record"] = path
     if not no_figure:
-        with terminal.writing(output):
-            files["figure"] = _draw(output / "figure.png", recording, sensor, source)
-    session.report(values, files, _table(values, source))
+        session.draw(_figure, recording, sensor, source)
+    session.report(values, _table(values, source))
     kept = f"{values['samples']} of {steps} samples are kept"
     lost = f"{session.trouble}; the samples until then are kept" if session.trouble else ""
     session.end(kept, lost)
@@ -420,23 +422,20 @@ def measures(recording: Recording, *, simulated: bool) -> dict[str, Any]:
     }
 
 
-def _draw(path: Path, recording: Recording, sensor: RangeBearing, source: str) -> Path:
+def _figure(recording: Recording, sensor: RangeBearing, source: str) -> Figure:
     from auvest import plots  # here, because matplotlib takes long to import
 
-    return plots.save(
-        plots.capture_figure(
-            recording.columns("x_m", "y_m"),
-            recording.columns("desired_x_m", "desired_y_m"),
-            observed_positions(recording.columns("range_m", "bearing_rad"), sensor.station),
-            recording.columns("true_x_m", "true_y_m"),
-            station=sensor.station,
-            time_s=recording.column("time_s"),
-            interval_s=recording.column("interval_s"),
-            sigma_m=np.sqrt(recording.column("P00_m2") + recording.column("P11_m2")),
-            nis=recording.column("nis"),
-            title=f"{Path(source).name}: {len(recording.rows)} samples",
-        ),
-        path,
+    return plots.capture_figure(
+        recording.columns("x_m", "y_m"),
+        recording.columns("desired_x_m", "desired_y_m"),
+        observed_positions(recording.columns("range_m", "bearing_rad"), sensor.station),
+        recording.columns("true_x_m", "true_y_m"),
+        station=sensor.station,
+        time_s=recording.column("time_s"),
+        interval_s=recording.column("interval_s"),
+        sigma_m=np.sqrt(recording.column("P00_m2") + recording.column("P11_m2")),
+        nis=recording.column("nis"),
+        title=f"{Path(source).name}: {len(recording.rows)} samples",
     )
 
 

@@ -26,39 +26,22 @@ def refuse_given(ctx: typer.Context, names: tuple[str, ...], why: str) -> None:
             raise typer.BadParameter(why, param_hint=f"'--{name.replace('_', '-')}'")
 
 
-def positive(value: float | None) -> float | None:
-    """Option callback: a finite number above zero."""
-    if value is not None and not (math.isfinite(value) and value > 0):
-        raise typer.BadParameter(f"{value} is not a finite number above 0.")
-    return value
+def _check(holds: Callable[[float], bool], expected: str) -> Callable[[float | None], float | None]:
+    """Make an option callback: the number, if one was given, must be what is expected."""
+
+    def check(value: float | None) -> float | None:
+        if value is not None and not holds(value):
+            raise typer.BadParameter(f"{value} is not {expected}.")
+        return value
+
+    return check
 
 
-def not_negative(value: float) -> float:
-    """Option callback: a finite number of at least zero."""
-    if not (math.isfinite(value) and value >= 0):
-        raise typer.BadParameter(f"{value} is not a finite number of at least 0.")
-    return value
-
-
-def finite(value: float | None) -> float | None:
-    """Option callback: any finite number."""
-    if value is not None and not math.isfinite(value):
-        raise typer.BadParameter(f"{value} is not a finite number.")
-    return value
-
-
-def fraction(value: float | None) -> float | None:
-    """Option callback: a probability below one."""
-    if value is not None and not 0 <= value < 1:
-        raise typer.BadParameter(f"{value} is not a probability of at least 0 and below 1.")
-    return value
-
-
-def open_unit(value: float | None) -> float | None:
-    """Option callback: strictly between zero and one."""
-    if value is not None and not 0 < value < 1:
-        raise typer.BadParameter(f"{value} is not strictly between 0 and 1.")
-    return value
+finite = _check(math.isfinite, "a finite number")
+positive = _check(lambda value: 0 < value < math.inf, "a finite number above 0")
+not_negative = _check(lambda value: 0 <= value < math.inf, "a finite number of at least 0")
+fraction = _check(lambda value: 0 <= value < 1, "a probability of at least 0 and below 1")
+open_unit = _check(lambda value: 0 < value < 1, "strictly between 0 and 1")
 
 
 def option(

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, NoReturn, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -13,8 +13,11 @@ from rich.table import Table
 from auvest import Status
 from auvest.commands.console import Terminal
 from auvest.commands.exit_codes import ExitCode
-from auvest.commands.files import write_results
+from auvest.commands.files import write_csv, write_results
 from auvest.commands.version import version
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 R = TypeVar("R")
 Floats: TypeAlias = npt.NDArray[np.float64]
@@ -40,6 +43,8 @@ class Session:
         Ctrl-C came before all was done.
     trouble : str
         What else ended it before all was done.
+    files : dict of str to Path
+        What was written, by its name on the terminal.
     """
 
     def __init__(
@@ -47,12 +52,18 @@ class Session:
     ) -> None:
         self.interrupted = False
         self.trouble = ""
+        self.files: dict[str, Path] = {}
         self._terminal = terminal
         self._output = output
         self._head = {"command": command, "version": version(), "settings": settings}
         terminal.make_folder(output)
 
-    def run(
+    def run(self, simulate: Callable[..., R], *arguments: Any, **options: Any) -> R:
+        """Do the runs; after Ctrl-C return those that are done, end if there are none."""
+        done = self.run_some(simulate, *arguments, **options)
+        return self.nothing_done() if done is None else done
+
+    def run_some(
         self, simulate: Callable[..., R], *arguments: Any, what: str = "runs", **options: Any
     ) -> R | None:
         """Do the runs; after Ctrl-C return those that are done, None if there are none."""
@@ -61,24 +72,34 @@ class Session:
                 return simulate(*arguments, progress=progress, **options)
             except KeyboardInterrupt as stop:
                 self.interrupted = True
-                partial: R | None = getattr(stop, "partial", None)
-                return partial
+                return getattr(stop, "partial", None)
 
     def nothing_done(self) -> NoReturn:
         """End after Ctrl-C before the first run was done."""
         self._terminal.fail("interrupted: no run was done", ExitCode.INTERRUPTED)
 
-    def report(
-        self, results: dict[str, Any], files: dict[str, Path], table: Table, **more: Any
-    ) -> None:
+    def write_csv(self, name: str, columns: Mapping[str, npt.NDArray[Any]]) -> None:
+        """Write a table of the results."""
+        with self._terminal.writing(self._output):
+            self.files[name] = write_csv(self._output / f"{name}.csv", columns)
+
+    def draw(self, figure: Callable[..., Figure], *arguments: Any) -> None:
+        """Draw the figure of the results."""
+        from auvest import plots  # here, because matplotlib takes long to import
+
+        with self._terminal.writing(self._output):
+            path = self._output / "figure.png"
+            self.files["figure"] = plots.save(figure(*arguments), path)
+
+    def report(self, results: dict[str, Any], table: Table, **more: Any) -> None:
         """Write results.json beside the files that are there, and print what was asked for."""
         complete = not (self.interrupted or self.trouble)
         document = {**self._head, "complete": complete, "results": results, **more}
         with self._terminal.writing(self._output):
-            write_results(self._output, document, files)
+            write_results(self._output, document, self.files)
         self._terminal.result_json(document)
         self._terminal.result(table)
-        self._terminal.files(files)
+        self._terminal.files(self.files)
 
     def end(self, kept: str, *failures: str) -> None:
         """End with what was interrupted or failed, if anything was."""

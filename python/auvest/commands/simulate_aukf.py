@@ -16,25 +16,18 @@ Examples
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 import typer
 from rich.table import Table
 
-from auvest import (
-    CovarianceBudget,
-    FixedInterval,
-    MahalanobisInterval,
-    RangeBearing,
-    metrics,
-)
+from auvest import CovarianceBudget, FixedInterval, MahalanobisInterval, RangeBearing, metrics
 from auvest.commands import options
 from auvest.commands.console import Terminal, table
-from auvest.commands.files import write_csv
 from auvest.commands.options import (
     FILTER,
     MONTE_CARLO,
@@ -49,17 +42,24 @@ from auvest.commands.options import (
 from auvest.commands.session import Floats, Session, failure
 from auvest.intervals import IntervalPolicy
 from auvest.scenarios import paper_aukf
-from auvest.scenarios.paper_aukf import (
-    FilterName,
-    TrackName,
-    observed_positions,
-)
+from auvest.scenarios._runs import standard_error
+from auvest.scenarios.paper_aukf import FilterName, TrackName, observed_positions
 from auvest.scenarios.tracking import Scenario, TrackingResult, sensor_of, simulate
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _INTERVAL = "Sampling interval"
 
 _NOISE = paper_aukf.paper_noise()
 _LAW = MahalanobisInterval()
+
+#: The interval policies, and which parameter of each an option is.
+_POLICIES: dict[str, tuple[Callable[..., IntervalPolicy], dict[str, str]]] = {
+    "fixed": (FixedInterval, {"fixed_interval": "interval_s"}),
+    "covariance-budget": (CovarianceBudget, {"budget": "position_sigma_m"}),
+    "mahalanobis": (MahalanobisInterval, {"preset": "preset", "tau0": "tau0"}),
+}
 
 
 def command(
@@ -152,9 +152,8 @@ def command(
         refuse_given(
             ctx, ("alpha", "beta", "kappa"), "belongs to --filter ukf or aukf, not to ekf."
         )
-    policy = _interval_policy(
-        filter_name, interval, preset=preset, tau0=tau0, fixed=fixed_interval, budget=budget
-    )
+    given = {"preset": preset, "tau0": tau0, "fixed_interval": fixed_interval, "budget": budget}
+    policy = _interval_policy(ctx, filter_name, interval, given)
     world = paper_aukf.paper_noise(
         noise,
         range_m=range_noise,
@@ -194,32 +193,19 @@ def command(
     }
     session = Session(terminal, output, "simulate aukf", settings)
     result = session.run(simulate, filter_, scenario, workers=workers)
-    if result is None:
-        session.nothing_done()
     values = measures(result)
     per_step = means_per_step(result)
-    with terminal.writing(output):
-        files = {
-            "per_step": write_csv(output / "per_step.csv", per_step),
-            "one_run": write_csv(output / "one_run.csv", one_run(result, sensor_of(filter_))),
-        }
-        if not no_figure:
-            files["figure"] = _draw(
-                output / "figure.png", result, sensor_of(filter_), filter_name, policy
-            )
-    session.report(values, files, _table(values, settings), per_step=per_step)
+    session.write_csv("per_step", per_step)
+    session.write_csv("one_run", one_run(result, sensor_of(filter_)))
+    if not no_figure:
+        session.draw(_figure, result, sensor_of(filter_), filter_name, policy)
+    session.report(values, _table(values, settings), per_step=per_step)
     kept = f"{values['runs']} of {runs} runs are done and kept"
     session.end(kept, failure(result))
 
 
 def _interval_policy(
-    filter_name: str,
-    interval: str | None,
-    *,
-    preset: Literal["figure3", "table1"] | None,
-    tau0: float | None,
-    fixed: float | None,
-    budget: float | None,
+    ctx: typer.Context, filter_name: str, interval: str | None, given: Mapping[str, object]
 ) -> IntervalPolicy:
     """Build the policy that the options ask for; options of another policy are refused."""
     kind = interval or ("mahalanobis" if filter_name == "aukf" else "fixed")
@@ -228,23 +214,12 @@ def _interval_policy(
             f"'{kind}' needs --filter aukf; {filter_name} samples at a fixed interval.",
             param_hint="'--interval'",
         )
-    policies: dict[str, tuple[Callable[..., IntervalPolicy], dict[str, tuple[str, object]]]] = {
-        "fixed": (FixedInterval, {"--fixed-interval": ("interval_s", fixed)}),
-        "covariance-budget": (CovarianceBudget, {"--budget": ("position_sigma_m", budget)}),
-        "mahalanobis": (
-            MahalanobisInterval,
-            {"--preset": ("preset", preset), "--tau0": ("tau0", tau0)},
-        ),
-    }
-    for owner, (_, owned) in policies.items():
-        for name, (_, value) in owned.items():
-            if value is not None and owner != kind:
-                raise typer.BadParameter(
-                    f"belongs to --interval {owner}, not to {kind}.", param_hint=f"'{name}'"
-                )
-    make, given = policies[kind]
+    for owner, (_, owned) in _POLICIES.items():
+        if owner != kind:
+            refuse_given(ctx, tuple(owned), f"belongs to --interval {owner}, not to {kind}.")
+    make, names = _POLICIES[kind]
     try:
-        return make(**{name: value for name, value in given.values() if value is not None})
+        return make(**{names[name]: given[name] for name in names if given[name] is not None})
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint=f"'--interval {kind}'") from None
 
@@ -256,7 +231,6 @@ def measures(result: TrackingResult) -> dict[str, Any]:
     seen = np.isfinite(square).any(axis=1)
     per_run = np.nanmean(square[seen], axis=1)
     rmse = result.rmse_m
-    spread = float(per_run.std(ddof=1) / np.sqrt(len(per_run))) if len(per_run) > 1 else np.nan
     nis = result.nis[np.isfinite(result.nis)]
     nis_bounds = metrics.chi2_bounds(2, nis.size) if nis.size else (np.nan, np.nan)
     nees = result.nees
@@ -269,7 +243,7 @@ def measures(result: TrackingResult) -> dict[str, Any]:
         "failed_runs": int(result.failed.sum()),
         "samples": int(result.samples.sum()),
         "rmse_m": rmse,
-        "rmse_standard_error_m": spread / (2 * rmse) if rmse > 0 else np.nan,
+        "rmse_standard_error_m": standard_error(per_run) / (2 * rmse) if rmse > 0 else np.nan,
         "rmse_x_m": metrics.rmse(result.error[..., :1]),
         "rmse_y_m": metrics.rmse(result.error[..., 1:]),
         "mean_interval_s": interval,
@@ -330,13 +304,9 @@ def _mean(values: Floats) -> float:
     return float(known.mean()) if known.size else float("nan")
 
 
-def _draw(
-    path: Path,
-    result: TrackingResult,
-    sensor: RangeBearing,
-    name: str,
-    policy: IntervalPolicy,
-) -> Path:
+def _figure(
+    result: TrackingResult, sensor: RangeBearing, name: str, policy: IntervalPolicy
+) -> Figure:
     from auvest import plots  # here, because matplotlib takes long to import
 
     colour = plots.FILTER_COLOURS[name]
@@ -351,7 +321,7 @@ def _draw(
         pace.append(plots.Line("fixed, Table 1", fixed, colour=plots.BLACK, style="--"))
     sigma = np.sqrt(np.diagonal(result.position_covariance[0], axis1=-2, axis2=-1))
     noise = result.scenario.noise
-    figure = plots.simulation_figure(
+    return plots.simulation_figure(
         result.truth[0],
         result.x[0, :, :2],
         observed_positions(result.z[0], sensor.station),
@@ -365,7 +335,6 @@ def _draw(
         label=f"{name.upper()} estimate",
         colour=colour,
     )
-    return plots.save(figure, path)
 
 
 def _table(values: dict[str, Any], settings: dict[str, Any]) -> Table:

@@ -18,8 +18,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from rich.table import Table
@@ -27,12 +28,14 @@ from rich.table import Table
 from auvest import RejectionStreak, metrics
 from auvest.commands import options
 from auvest.commands.console import Terminal, table
-from auvest.commands.files import write_csv
 from auvest.commands.options import FILTER, MONTE_CARLO, WORLD, finite, fraction, option, positive
 from auvest.commands.session import Floats, Session, failure, mean_over_runs
 from auvest.kernels import KernelName, as_kernel
 from auvest.scenarios import cooperative
 from auvest.scenarios.cooperative import NoiseKind, RangeNoise, Result, Scenario, Timing
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _NOISE = RangeNoise()
 
@@ -122,17 +125,9 @@ def command(
             offset_m=(displaced, 0.0),
         )
         recovery = RejectionStreak(rejections=rejections) if rejections else None
-        robust = cooperative.slave_filter(
-            kernel,
-            kind=kind,
-            sigma_range_m=range_noise,
-            recovery=recovery,
-            residual=residual,
-            dtype=dtype,
-        )
-        plain = cooperative.slave_filter(
-            "unit", kind=kind, sigma_range_m=range_noise, recovery=None, dtype=dtype
-        )
+        make = partial(cooperative.slave_filter, kind=kind, sigma_range_m=range_noise, dtype=dtype)
+        robust = make(kernel, recovery=recovery, residual=residual)
+        plain = make("unit", recovery=None)
     settings = {
         "filter": kind,
         "kernel": {"name": kernel, **asdict(as_kernel(kernel))},
@@ -144,7 +139,7 @@ def command(
     session = Session(terminal, output, "simulate mekf", settings)
     results: dict[str, Result] = {}
     for name, filter_ in (("plain", plain), ("robust", robust)):
-        result = session.run(
+        result = session.run_some(
             cooperative.simulate,
             filter_,
             scenario,
@@ -161,11 +156,10 @@ def command(
     values: dict[str, Any] = {name: measures(result) for name, result in results.items()}
     if len(values) == 2:
         values["improvement"] = 1 - values["robust"]["rmse_m"] / values["plain"]["rmse_m"]
-    with terminal.writing(output):
-        files = {"per_step": write_csv(output / "per_step.csv", means_per_step(results))}
-        if not no_figure:
-            files["figure"] = _draw(output / "figure.png", results, kernel, kind)
-    session.report(values, files, _table(values, settings))
+    session.write_csv("per_step", means_per_step(results))
+    if not no_figure:
+        session.draw(_figure, results, kernel, kind)
+    session.report(values, _table(values, settings))
     failures = (failure(result, f" of the {name} filter") for name, result in results.items())
     session.end("what was done is kept", *failures)
 
@@ -207,7 +201,7 @@ def means_per_step(results: dict[str, Result]) -> dict[str, Floats]:
     return table
 
 
-def _draw(path: Path, results: dict[str, Result], kernel: str, kind: str) -> Path:
+def _figure(results: dict[str, Result], kernel: str, kind: str) -> Figure:
     from auvest import plots  # here, because matplotlib takes long to import
 
     per_step = means_per_step(results)
@@ -223,14 +217,9 @@ def _draw(path: Path, results: dict[str, Result], kernel: str, kind: str) -> Pat
         if name == "robust":
             taken = ~np.isnan(result.weight[0])
             weights.plot(hours[taken], result.weight[0][taken], ".", color=colour, markersize=3)
-    error.set_ylabel("RMS error / m")
-    error.set_ylim(bottom=0)
-    error.legend(fontsize=8)
-    weights.set_ylabel("weight, run 0")
-    weights.set_xlabel("time / h")
-    for panel in (error, weights):
-        plots.style(panel)
-    return plots.save(figure, path)
+    plots.style(error, legend=8, ylabel="RMS error / m", ylim=(0, None))
+    plots.style(weights, ylabel="weight, run 0", xlabel="time / h")
+    return figure
 
 
 def _table(values: dict[str, Any], settings: dict[str, Any]) -> Table:

@@ -16,9 +16,9 @@ Examples
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -28,7 +28,6 @@ from rich.table import Table
 from auvest import metrics, montecarlo
 from auvest.commands import console, options
 from auvest.commands.console import Terminal
-from auvest.commands.files import write_csv
 from auvest.commands.options import (
     FILTER,
     WORLD,
@@ -40,29 +39,22 @@ from auvest.commands.options import (
 )
 from auvest.commands.session import Floats, Session, failure, mean_over_runs
 from auvest.commands.version import version
-from auvest.scenarios.paper_aukf import DTypeName
-from auvest.scenarios.paper_slatf import LEVELS, PARTICLES, RUNS
+from auvest.scenarios.paper_slatf import LEVELS, PARTICLES, RUNS, FilterName, paper_filter
 from auvest.scenarios.slat import SlatResult, SlatScenario, paper_masters, simulate
-from auvest.slat import (
-    MAX_MASTERS,
-    DeadReckoning,
-    EkfSlat,
-    Lanes,
-    ParticleSlatFilter,
-    Resampling,
-    Slatf,
-    SlatFilter,
-    SlatfJoint,
-)
+from auvest.slat import MAX_MASTERS, Lanes, ParticleSlatFilter, Resampling, Slatf
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 FilterOption = Literal["slatf1", "slatf2", "slatf-joint", "ekf-slat", "dead-reckoning"]
 _PARTICLE_FILTERS: tuple[FilterOption, ...] = ("slatf1", "slatf2", "slatf-joint")
-_TITLES: dict[FilterOption, str] = {
-    "slatf1": "SLATF 1.0",
-    "slatf2": "SLATF 2.0",
-    "slatf-joint": "SLATF, joint",
-    "ekf-slat": "EKF-SLAT",
-    "dead-reckoning": "dead reckoning",
+#: Names in the paper's scenario, and titles.
+_FILTERS: dict[FilterOption, tuple[FilterName, str]] = {
+    "slatf1": ("slatf1", "SLATF 1.0"),
+    "slatf2": ("slatf2", "SLATF 2.0"),
+    "slatf-joint": ("slatf_joint", "SLATF, joint"),
+    "ekf-slat": ("ekf_slat", "EKF-SLAT"),
+    "dead-reckoning": ("dr_compensated", "dead reckoning"),
 }
 
 
@@ -140,6 +132,7 @@ def command(
         refuse_given(ctx, ("lanes",), "belongs to slatf1 and slatf2.")
     if filter_name == "dead-reckoning":
         refuse_given(ctx, ("gate",), "does nothing: dead reckoning hears no echo.")
+    name, title = _FILTERS[filter_name]
     noise = LEVELS[level - 1]
     with terminal.usage_errors():
         scenario = SlatScenario(
@@ -154,15 +147,18 @@ def command(
             runs=runs,
             seed=seed,
         )
-        filter_ = _filter(
-            filter_name,
+        hearing: dict[str, Any] = {"gate": gate}
+        if filter_name in _PARTICLE_FILTERS:
+            hearing["resampling"] = resampling
+        if filter_name in ("slatf1", "slatf2"):
+            hearing["lanes"] = lanes
+        filter_ = paper_filter(
+            name,
             scenario,
-            compensate_bias=heading_bias == "compensate",
-            gate=gate,
             particles=particles,
-            resampling=resampling,
-            lanes=lanes,
+            compensate_bias=heading_bias == "compensate",
             dtype=dtype,
+            **hearing,
         )
     settings = {
         "filter": filter_name,
@@ -179,60 +175,24 @@ def command(
     }
     session = Session(terminal, output, "simulate slatf", settings)
     store = output / ".runs"
+    identity = _identity(settings)
     with terminal.writing(output):
         result = session.run(
-            simulate,
-            filter_,
-            scenario,
-            workers=workers,
-            store=store,
-            settings=_identity(settings),
+            simulate, filter_, scenario, workers=workers, store=store, settings=identity
         )
-    if result is None:
-        session.nothing_done()
     values = measures(result)
     per_ping = means_per_ping(result)
+    session.write_csv("per_ping", per_ping)
     with terminal.writing(output):
-        files = {
-            "per_ping": write_csv(output / "per_ping.csv", per_ping),
-            "runs": montecarlo.write_table(output / f"runs.{table}", per_run(result)),
-        }
-        if not no_figure:
-            files["figure"] = _draw(output / "figure.png", result, _TITLES[filter_name])
-    title = _TITLES[filter_name]
-    session.report(values, files, _table(values, scenario, title), per_ping=per_ping)
+        path = output / f"runs.{table}"
+        session.files["runs"] = montecarlo.write_table(path, per_run(result))
+    if not no_figure:
+        session.draw(_figure, result, title)
+    session.report(values, _table(values, scenario, title), per_ping=per_ping)
     kept = f"{values['runs']} of {runs} runs are done and kept; the same command goes on from there"
     if not session.interrupted:
         montecarlo.discard(store)
     session.end(kept, failure(result))
-
-
-def _filter(
-    name: FilterOption,
-    scenario: SlatScenario,
-    *,
-    compensate_bias: bool,
-    gate: float,
-    particles: int,
-    resampling: Resampling,
-    lanes: Lanes | None,
-    dtype: DTypeName,
-) -> SlatFilter:
-    x0 = np.array([scenario.slave.x_m, scenario.slave.y_m])
-    P0 = np.zeros((2, 2))
-    options: dict[str, Any] = {
-        "motion": replace(scenario.motion, compensate_bias=compensate_bias),
-        "dtype": dtype,
-    }
-    if name == "dead-reckoning":
-        return DeadReckoning(x0, P0, **options)
-    options.update(sonar=scenario.sonar, gate=gate)
-    if name == "ekf-slat":
-        return EkfSlat(x0, P0, **options)
-    options.update(particles=particles, resampling=resampling)
-    if name == "slatf-joint":
-        return SlatfJoint(x0, P0, max_masters=len(scenario.masters), **options)
-    return Slatf(x0, P0, version=1 if name == "slatf1" else 2, lanes=lanes, **options)
 
 
 def _identity(settings: dict[str, Any]) -> dict[str, Any]:
@@ -286,23 +246,20 @@ def per_run(result: SlatResult) -> dict[str, npt.NDArray[Any]]:
     }
 
 
-def _draw(path: Path, result: SlatResult, title: str) -> Path:
+def _figure(result: SlatResult, title: str) -> Figure:
     from auvest import plots  # here, because matplotlib takes long to import
 
     scenario = result.scenario
     name = f"{title}: RMSE {result.rmse_m:.3g} m, {scenario.sigma_range_m:g} m"
-    return plots.save(
-        plots.slave_figure(
-            result.truth,
-            result.truth + result.error[0],
-            result.masters,
-            time_s=result.time_s,
-            error_m=result.distance_m[0],
-            sigma_m=np.sqrt(np.trace(result.covariance[0], axis1=-2, axis2=-1)),
-            rms_m=means_per_ping(result)["rms_error_m"],
-            title=f"{name}, {scenario.sigma_bearing_rad:g} rad",
-        ),
-        path,
+    return plots.slave_figure(
+        result.truth,
+        result.truth + result.error[0],
+        result.masters,
+        time_s=result.time_s,
+        error_m=result.distance_m[0],
+        sigma_m=np.sqrt(np.trace(result.covariance[0], axis1=-2, axis2=-1)),
+        rms_m=means_per_ping(result)["rms_error_m"],
+        title=f"{name}, {scenario.sigma_bearing_rad:g} rad",
     )
 
 

@@ -149,7 +149,7 @@ class GaussianFilter:
             "late_s": self._options["late_s"],
         }
         try:
-            made: _Filter[Any] = getattr(_core, f"Filter_{name}")(
+            return getattr(_core, f"Filter_{name}")(
                 self._process.core(self._dtype),
                 core_kernel(_UNIT if self._kernel is None else self._kernel, name),
                 core_interval(_FIXED if policy is None else policy, name),
@@ -159,21 +159,18 @@ class GaussianFilter:
             given = {**self._parameters, "tolerance": self._options["tolerance"]}
             text = ", ".join(f"{key}={value}" for key, value in given.items())
             raise ValueError(f"{text} do not suit {name}: {error}") from None
-        return made
 
     # ---- What can be read -----------------------------------------------------------------------
 
     @property
     def x(self) -> Floats:
         """The estimate, shape (n,), a copy; its components are named by ``process.state``."""
-        x: Floats = self._filter.x
-        return x
+        return self._filter.x
 
     @property
     def P(self) -> Floats:
         """The covariance of the estimate, shape (n, n), a copy."""
-        p: Floats = self._filter.P
-        return p
+        return self._filter.P
 
     @property
     def report(self) -> Report | None:
@@ -238,8 +235,7 @@ class GaussianFilter:
     @property
     def residual(self) -> Residual:
         """Which residual the kernel judges."""
-        kind: Residual = self._options["residual"]
-        return kind
+        return self._options["residual"]
 
     @property
     def late_s(self) -> float:
@@ -282,8 +278,7 @@ class GaussianFilter:
     def _last(self, name: str, axes: int) -> Floats:
         given = self._filter.report
         if given is not None:
-            last: Floats = given[name]
-            return last
+            return given[name]
         size = self._only.size if self._only is not None else 0
         return np.full((size,) * axes, np.nan, self._dtype)
 
@@ -683,25 +678,20 @@ class GaussianFilter:
         rows[beyond] = np.nan
         return rows
 
-    def _as_input(self, input: npt.ArrayLike | None) -> Floats | None:
-        names = self._process.input
-        if not names:
-            self._refuse_input(input)
-            return None
-        return as_array("input", input, (len(names),), self._dtype)
-
-    def _as_inputs(self, input: npt.ArrayLike | None, count: int) -> Floats | None:
-        names = self._process.input
-        if not names:
-            self._refuse_input(input)
-            return None
-        inputs = as_array("input", input, (None, len(names)), self._dtype)
-        _require_rows("input", inputs, count)
-        return inputs
-
-    def _refuse_input(self, input: object) -> None:
+    def _as_input(self, input: npt.ArrayLike | None, *rows: None) -> Floats | None:
+        """Take the numbers of one prediction or, with a None, rows of them."""
+        size = len(self._process.input)
+        if size:
+            return as_array("input", input, (*rows, size), self._dtype)
         if input is not None:
             raise TypeError(f"input must be None: {type(self._process).__name__} has no input")
+        return None
+
+    def _as_inputs(self, input: npt.ArrayLike | None, count: int) -> Floats | None:
+        inputs = self._as_input(input, None)
+        if inputs is not None:
+            _require_rows("input", inputs, count)
+        return inputs
 
     def _as_place(self, place: npt.ArrayLike, handle: _Sensor[Any]) -> Floats:
         if handle.place == 0:

@@ -230,8 +230,7 @@ def _write_start(folder: Path, row: Rows, heading: float) -> None:
 
 
 def _wrapped(angle: Rows) -> Rows:
-    wrapped: Rows = np.angle(np.exp(1j * angle))
-    return wrapped
+    return np.angle(np.exp(1j * angle))
 
 
 def _table(path: Path, *names: str) -> Rows:
@@ -249,8 +248,7 @@ def _table(path: Path, *names: str) -> Rows:
         if isinstance(error, LogError):
             raise
         raise LogError(path, f"is not a table of numbers: {error}") from None
-    columns: Rows = rows[:, [header.index(name) for name in names]] if names else rows
-    return columns
+    return rows[:, [header.index(name) for name in names]] if names else rows
 
 
 def _text(path: Path, columns: int) -> Rows:

@@ -10,14 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from auvest import _core
-from auvest._arguments import (
-    Bound,
-    DType,
-    Floats,
-    as_array,
-    as_number,
-    require_range,
-)
+from auvest._arguments import DType, Floats, as_array, as_number, require_range
+from auvest._fields import Checked
 from auvest._state import describe
 
 if TYPE_CHECKING:
@@ -26,7 +20,7 @@ if TYPE_CHECKING:
 _FLOAT64 = np.dtype(np.float64)
 
 
-class Model:
+class Model(Checked):
     """A frozen dataclass of parameters that knows its counterpart in the core.
 
     Handles on the core are made when they are first needed and stay with the model; they are no
@@ -78,10 +72,6 @@ class Model:
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in self.__dict__.items() if name != "_handles"}
 
-    def _set_numbers(self, bound: Bound, *names: str) -> None:
-        for name in names:
-            object.__setattr__(self, name, as_number(name, getattr(self, name), bound))
-
 
 #: Begins what is kept instead of a description where a model cannot be described.
 UNSAVED = "!"
@@ -119,18 +109,16 @@ class ProcessModel(Model):
             make_process = getattr(_core, f"make_process_{dtype.name}")
             return make_process(self.core_name, self.values(dtype.name))
 
-        process: _Process[Any] = self._handle(dtype.name, make)
-        return process
+        return self._handle(dtype.name, make)
 
     def f(
         self, x: npt.ArrayLike, dt: float, input: npt.ArrayLike | None = None
     ) -> npt.NDArray[np.float64]:
         """State (n,) after ``dt >= 0`` seconds without noise, in float64."""
         state = as_array("x", x, (len(self.state),), _FLOAT64)
-        after: npt.NDArray[np.float64] = self.core(_FLOAT64).f(
+        return self.core(_FLOAT64).f(
             state, as_number("dt", dt, "not negative"), self._as_input(input)
         )
-        return after
 
     def Phi(
         self, dt: float, x: npt.ArrayLike | None = None, input: npt.ArrayLike | None = None
@@ -141,17 +129,13 @@ class ProcessModel(Model):
         state: npt.NDArray[np.float64] = np.zeros(len(self.state))
         if x is not None:
             state = as_array("x", x, (len(self.state),), _FLOAT64).astype(np.float64)
-        phi: npt.NDArray[np.float64] = self.core(_FLOAT64).Phi(
+        return self.core(_FLOAT64).Phi(
             state, as_number("dt", dt, "not negative"), self._as_input(input)
         )
-        return phi
 
     def Q(self, dt: float, input: npt.ArrayLike | None = None) -> npt.NDArray[np.float64]:
         """Covariance (n, n) of the process noise of ``dt >= 0`` seconds, in float64."""
-        q: npt.NDArray[np.float64] = self.core(_FLOAT64).Q(
-            as_number("dt", dt, "not negative"), self._as_input(input)
-        )
-        return q
+        return self.core(_FLOAT64).Q(as_number("dt", dt, "not negative"), self._as_input(input))
 
     def _as_input(self, input: npt.ArrayLike | None) -> npt.NDArray[np.float64]:
         if input is None:
@@ -207,8 +191,7 @@ class MeasurementModel(Model):
             sensor.description = saved_as(self)
             return sensor
 
-        sensor: _Sensor[Any] = self._handle((states, dtype.name), make)
-        return sensor
+        return self._handle((states, dtype.name), make)
 
     def h(self, x: npt.ArrayLike) -> npt.NDArray[np.float64]:
         """Measurements without noise.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from auvest import _core
-from auvest._arguments import as_integer
+from auvest._fields import integer, number, positive
 from auvest.models._base import MeasurementModel
 
 _DEFAULTS = _core.sensor_defaults("BodyVelocity3")
@@ -38,17 +38,11 @@ class BodyVelocity(MeasurementModel):
     structural = ("axes",)
     place = "heading_rad"
 
-    axes: Literal[2, 3] = 2
-    heading_rad: float = _DEFAULTS["heading_rad"]
-    sigma_forward_m_s: float = _DEFAULTS["sigma_forward_m_s"]
-    sigma_sideways_m_s: float = _DEFAULTS["sigma_sideways_m_s"]
-    sigma_vertical_m_s: float = _DEFAULTS["sigma_vertical_m_s"]
-
-    def __post_init__(self) -> None:
-        as_integer("axes", self.axes, 2, 3)
-        self._set_numbers("any", "heading_rad")
-        names = ("sigma_forward_m_s", "sigma_sideways_m_s", "sigma_vertical_m_s")
-        self._set_numbers("positive", *names)
+    axes: Literal[2, 3] = integer(2, 2, 3)
+    heading_rad: float = number(_DEFAULTS["heading_rad"])
+    sigma_forward_m_s: float = positive(_DEFAULTS["sigma_forward_m_s"])
+    sigma_sideways_m_s: float = positive(_DEFAULTS["sigma_sideways_m_s"])
+    sigma_vertical_m_s: float = positive(_DEFAULTS["sigma_vertical_m_s"])
 
     @property
     def observes(self) -> tuple[str, ...]:  # type: ignore[override]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from auvest import _core
-from auvest._arguments import as_kind
+from auvest._fields import choice, not_negative
 from auvest.models._base import ProcessModel
 
 _DEFAULTS = _core.process_defaults("ExactAcceleration")
@@ -34,14 +34,10 @@ class ConstantAcceleration(ProcessModel):
     structural = ("discretisation",)
     state = ("x_m", "y_m", "vx_m_s", "vy_m_s", "ax_m_s2", "ay_m_s2")
 
-    discretisation: Literal["exact", "euler"] = "exact"
-    position_psd: float = _DEFAULTS["position_psd"]
-    velocity_psd: float = _DEFAULTS["velocity_psd"]
-    acceleration_psd: float = _DEFAULTS["acceleration_psd"]
-
-    def __post_init__(self) -> None:
-        as_kind("discretisation", self.discretisation, ("exact", "euler"))
-        self._set_numbers("not negative", "position_psd", "velocity_psd", "acceleration_psd")
+    discretisation: Literal["exact", "euler"] = choice("exact", "euler")
+    position_psd: float = not_negative(_DEFAULTS["position_psd"])
+    velocity_psd: float = not_negative(_DEFAULTS["velocity_psd"])
+    acceleration_psd: float = not_negative(_DEFAULTS["acceleration_psd"])
 
     @property
     def core_name(self) -> str:

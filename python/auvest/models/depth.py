@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from auvest import _core
+from auvest._fields import positive
 from auvest.models._base import MeasurementModel
 
 _DEFAULTS = _core.sensor_defaults("Depth")
@@ -28,7 +29,4 @@ class Depth(MeasurementModel):
     observes = ("x_m", "y_m", "z_m")
     measures = ("z_m",)
 
-    sigma_m: float = _DEFAULTS["sigma_m"]
-
-    def __post_init__(self) -> None:
-        self._set_numbers("positive", "sigma_m")
+    sigma_m: float = positive(_DEFAULTS["sigma_m"])

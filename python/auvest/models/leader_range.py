@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from auvest import _core
-from auvest._arguments import as_pair
+from auvest._fields import not_negative, pair, positive
 from auvest.models._base import MeasurementModel
 
 _DEFAULTS = _core.sensor_defaults("LeaderRange")
@@ -34,14 +34,9 @@ class LeaderRange(MeasurementModel):
     measures = ("range_m",)
     place = "leader"
 
-    leader: tuple[float, float] = (_DEFAULTS["leader_x_m"], _DEFAULTS["leader_y_m"])
-    sigma_range_m: float = _DEFAULTS["sigma_range_m"]
-    sigma_leader_m: float = _DEFAULTS["sigma_leader_m"]
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "leader", as_pair("leader", self.leader))
-        self._set_numbers("positive", "sigma_range_m")
-        self._set_numbers("not negative", "sigma_leader_m")
+    leader: tuple[float, float] = pair((_DEFAULTS["leader_x_m"], _DEFAULTS["leader_y_m"]))
+    sigma_range_m: float = positive(_DEFAULTS["sigma_range_m"])
+    sigma_leader_m: float = not_negative(_DEFAULTS["sigma_leader_m"])
 
     def _core_params(self) -> dict[str, float]:
         params = super()._core_params()

@@ -268,8 +268,7 @@ def _unpickled(
     models = _LOADED.get(key) or load_models(path, states=states)
     if models.digest != digest:
         raise ValueError(f"{name} was pickled when {path} had other contents")
-    model: Model = getattr(models, name)(**params)
-    return model
+    return getattr(models, name)(**params)
 
 
 def from_header(name: str, description: dict[str, Any]) -> Model:
@@ -284,6 +283,5 @@ def from_header(name: str, description: dict[str, Any]) -> Model:
     digest = params.pop("header")
     for models in _LOADED.values():
         if models.digest == digest:
-            model: Model = getattr(models, name)(**params)
-            return model
+            return getattr(models, name)(**params)
     raise ValueError(f"state needs the model {name} of a header that is not loaded; load_models it")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from auvest import _core
+from auvest._fields import not_negative
 from auvest.models._base import ProcessModel
 
 _DEFAULTS = _core.process_defaults("Odometry")
@@ -36,9 +37,6 @@ class Odometry(ProcessModel):
     state = ("x_m", "y_m", "theta_rad")
     input = ("forward_m", "sideways_m", "turn_rad")
 
-    sigma_distance: float = _DEFAULTS["sigma_distance"]
-    sigma_drift: float = _DEFAULTS["sigma_drift"]
-    sigma_turn: float = _DEFAULTS["sigma_turn"]
-
-    def __post_init__(self) -> None:
-        self._set_numbers("not negative", "sigma_distance", "sigma_drift", "sigma_turn")
+    sigma_distance: float = not_negative(_DEFAULTS["sigma_distance"])
+    sigma_drift: float = not_negative(_DEFAULTS["sigma_drift"])
+    sigma_turn: float = not_negative(_DEFAULTS["sigma_turn"])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from auvest import _core
-from auvest._arguments import as_pair
+from auvest._fields import not_negative, pair, positive
 from auvest.models._base import MeasurementModel
 
 _DEFAULTS = _core.sensor_defaults("RangeBearing")
@@ -35,15 +35,10 @@ class RangeBearing(MeasurementModel):
     measures = ("range_m", "bearing_rad")
     place = "station"
 
-    station: tuple[float, float] = (_DEFAULTS["station_x_m"], _DEFAULTS["station_y_m"])
-    sigma_range_m: float = _DEFAULTS["sigma_range_m"]
-    sigma_bearing_rad: float = _DEFAULTS["sigma_bearing_rad"]
-    near_field: float = _DEFAULTS["near_field"]
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "station", as_pair("station", self.station))
-        self._set_numbers("positive", "sigma_range_m", "sigma_bearing_rad")
-        self._set_numbers("not negative", "near_field")
+    station: tuple[float, float] = pair((_DEFAULTS["station_x_m"], _DEFAULTS["station_y_m"]))
+    sigma_range_m: float = positive(_DEFAULTS["sigma_range_m"])
+    sigma_bearing_rad: float = positive(_DEFAULTS["sigma_bearing_rad"])
+    near_field: float = not_negative(_DEFAULTS["near_field"])
 
     def _core_params(self) -> dict[str, float]:
         params = super()._core_params()

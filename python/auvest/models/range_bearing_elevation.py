@@ -8,6 +8,7 @@ import numpy as np
 
 from auvest import _core
 from auvest._arguments import as_array
+from auvest._fields import not_negative, positive
 from auvest.models._base import MeasurementModel
 
 _DEFAULTS = _core.sensor_defaults("RangeBearingElevation")
@@ -48,16 +49,15 @@ class RangeBearingElevation(MeasurementModel):
         _DEFAULTS["station_y_m"],
         _DEFAULTS["station_z_m"],
     )
-    sigma_range_m: float = _DEFAULTS["sigma_range_m"]
-    sigma_bearing_rad: float = _DEFAULTS["sigma_bearing_rad"]
-    sigma_elevation_rad: float = _DEFAULTS["sigma_elevation_rad"]
-    near_field: float = _DEFAULTS["near_field"]
+    sigma_range_m: float = positive(_DEFAULTS["sigma_range_m"])
+    sigma_bearing_rad: float = positive(_DEFAULTS["sigma_bearing_rad"])
+    sigma_elevation_rad: float = positive(_DEFAULTS["sigma_elevation_rad"])
+    near_field: float = not_negative(_DEFAULTS["near_field"])
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         station = as_array("station", self.station, (3,), np.dtype(np.float64))
         object.__setattr__(self, "station", tuple(station.tolist()))
-        self._set_numbers("positive", "sigma_range_m", "sigma_bearing_rad", "sigma_elevation_rad")
-        self._set_numbers("not negative", "near_field")
 
     def _core_params(self) -> dict[str, float]:
         params = super()._core_params()

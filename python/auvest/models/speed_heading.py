@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from auvest import _core
-from auvest._arguments import as_flag
+from auvest._fields import flag, not_negative
 from auvest.models._base import ProcessModel
 
 _DEFAULTS = _core.process_defaults("SpeedHeading")
@@ -41,19 +41,13 @@ class SpeedHeading(ProcessModel):
     structural = ("heading_bias", "speed_scale")
     input = ("forward_m_s", "starboard_m_s", "heading_rad")
 
-    sigma_forward: float = _DEFAULTS["sigma_forward"]
-    sigma_starboard: float = _DEFAULTS["sigma_starboard"]
-    sigma_heading: float = _DEFAULTS["sigma_heading"]
-    heading_bias: bool = False
-    speed_scale: bool = False
-    bias_walk: float = _DEFAULTS["bias_walk"]
-    scale_walk: float = _DEFAULTS["scale_walk"]
-
-    def __post_init__(self) -> None:
-        names = ("sigma_forward", "sigma_starboard", "sigma_heading", "bias_walk", "scale_walk")
-        self._set_numbers("not negative", *names)
-        for name in ("heading_bias", "speed_scale"):
-            object.__setattr__(self, name, as_flag(name, getattr(self, name)))
+    sigma_forward: float = not_negative(_DEFAULTS["sigma_forward"])
+    sigma_starboard: float = not_negative(_DEFAULTS["sigma_starboard"])
+    sigma_heading: float = not_negative(_DEFAULTS["sigma_heading"])
+    heading_bias: bool = flag(False)
+    speed_scale: bool = flag(False)
+    bias_walk: float = not_negative(_DEFAULTS["bias_walk"])
+    scale_walk: float = not_negative(_DEFAULTS["scale_walk"])
 
     @property
     def state(self) -> tuple[str, ...]:  # type: ignore[override]

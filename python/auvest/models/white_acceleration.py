@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from auvest import _core
-from auvest._arguments import as_integer
+from auvest._fields import integer, not_negative
 from auvest.models._base import ProcessModel
 
 _DEFAULTS = _core.process_defaults("WhiteAcceleration3")
@@ -32,13 +32,9 @@ class WhiteAcceleration(ProcessModel):
 
     structural = ("axes",)
 
-    axes: Literal[2, 3] = 2
-    velocity_psd: float = _DEFAULTS["velocity_psd"]
-    vertical_velocity_psd: float = _DEFAULTS["vertical_velocity_psd"]
-
-    def __post_init__(self) -> None:
-        as_integer("axes", self.axes, 2, 3)
-        self._set_numbers("not negative", "velocity_psd", "vertical_velocity_psd")
+    axes: Literal[2, 3] = integer(2, 2, 3)
+    velocity_psd: float = not_negative(_DEFAULTS["velocity_psd"])
+    vertical_velocity_psd: float = not_negative(_DEFAULTS["vertical_velocity_psd"])
 
     @property
     def state(self) -> tuple[str, ...]:  # type: ignore[override]

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Literal, TypeAlias, get_args, get_type_hints
 
-from auvest._arguments import Bound, as_number
+from auvest._fields import not_negative, number, positive
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -21,67 +21,63 @@ PolicyName: TypeAlias = Literal["fixed", "covariance-budget", "mahalanobis"]
 _PACKAGED = Path(__file__).parent / "configs"
 
 
-def _number(default: float, bound: Bound = "not negative") -> Any:
-    return field(default=default, metadata={"bound": bound})
-
-
 @dataclass(frozen=True, kw_only=True)
 class FilterSettings:
     """The filter: ``kernel``, ``rejections`` and ``residual`` are those of robust-ekf."""
 
     kind: FilterName | None = None  # None: robust-ekf for ranges, ukf for fixes
     kernel: KernelName = "hampel"  # with the thresholds that are its defaults
-    alpha: float = _number(1e-3, "positive")
+    alpha: float = positive(1e-3)
 
 
 @dataclass(frozen=True, kw_only=True)
 class StartSettings:
     """Standard deviations of the belief that the run starts with."""
 
-    sigma_position_m: float = _number(1.0, "positive")
-    sigma_heading_rad: float = _number(0.1, "positive")
-    sigma_speed_m_s: float = _number(0.5, "positive")
-    sigma_acceleration_m_s2: float = _number(0.1, "positive")
+    sigma_position_m: float = positive(1.0)
+    sigma_heading_rad: float = positive(0.1)
+    sigma_speed_m_s: float = positive(0.5)
+    sigma_acceleration_m_s2: float = positive(0.1)
 
 
 @dataclass(frozen=True, kw_only=True)
 class OdometrySettings:
     """Noise of the odometry, and its calibration: factors on speed and turn, then an offset."""
 
-    sigma_distance: float = _number(0.05)  # of the distance of one increment
-    sigma_drift: float = _number(0.1)  # m/sqrt(s)
-    sigma_turn: float = _number(0.001)  # rad/sqrt(s)
-    speed_factor: float = _number(1.0, "positive")
-    turn_factor: float = _number(1.0, "positive")
-    turn_offset_rad_s: float = _number(0.0, "any")
-    max_step_s: float = _number(0.1, "positive")  # of velocity odometry
+    sigma_distance: float = not_negative(0.05)  # of the distance of one increment
+    sigma_drift: float = not_negative(0.1)  # m/sqrt(s)
+    sigma_turn: float = not_negative(0.001)  # rad/sqrt(s)
+    speed_factor: float = positive(1.0)
+    turn_factor: float = positive(1.0)
+    turn_offset_rad_s: float = number(0.0)
+    max_step_s: float = positive(0.1)  # of velocity odometry
 
 
 @dataclass(frozen=True, kw_only=True)
 class RangeSettings:
     """Ranges: noise, and the least time between two of one source that are used."""
 
-    sigma_m: float = _number(1.0, "positive")
-    every_s: float = _number(0.0)
+    sigma_m: float = positive(1.0)
+    every_s: float = not_negative(0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class FixSettings:
     """Fixes by range and bearing: noise, and the least time between two that are used."""
 
-    sigma_range_m: float = _number(0.1, "positive")
-    sigma_bearing_rad: float = _number(0.02, "positive")
-    near_field: float = _number(5.0)
-    every_s: float = _number(0.0)
+    sigma_range_m: float = positive(0.1)
+    sigma_bearing_rad: float = positive(0.02)
+    near_field: float = not_negative(5.0)
+    every_s: float = not_negative(0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ProcessSettings:
     """Driving noise of the tracked craft's motion, as of :class:`auvest.ConstantAcceleration`."""
 
-    position_psd: float = _number(0.0)
-    velocity_psd: float = _number(1e-2)
-    acceleration_psd: float = _number(1e-6)
+    position_psd: float = not_negative(0.0)
+    velocity_psd: float = not_negative(1e-2)
+    acceleration_psd: float = not_negative(1e-6)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,18 +85,18 @@ class IntervalSettings:
     """When aukf wants its next fix."""
 
     policy: PolicyName = "covariance-budget"
-    interval_s: float = _number(5.0, "positive")  # of fixed
-    min_s: float = _number(0.5, "positive")
-    max_s: float = _number(10.0, "positive")
-    position_sigma_m: float = _number(0.5, "positive")  # of covariance-budget
+    interval_s: float = positive(5.0)  # of fixed
+    min_s: float = positive(0.5)
+    max_s: float = positive(10.0)
+    position_sigma_m: float = positive(0.5)  # of covariance-budget
 
 
 @dataclass(frozen=True, kw_only=True)
 class LogSettings:
     """Window for late lines, and the longest gap in a leader's track that a line bridges."""
 
-    reorder_s: float = _number(0.0)
-    leader_gap_s: float = _number(1.0)
+    reorder_s: float = not_negative(0.0)
+    leader_gap_s: float = not_negative(1.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -177,9 +173,9 @@ def _section(kind: type[Any], values: dict[str, Any], where: str) -> Any:
     types = get_type_hints(kind)
     checked: dict[str, Any] = {}
     for key, value in values.items():
-        if "bound" in known[key].metadata:
+        if "take" in known[key].metadata:
             try:
-                checked[key] = as_number(key, value, known[key].metadata["bound"])
+                checked[key] = known[key].metadata["take"](key, value)
             except (ValueError, TypeError) as error:
                 raise ValueError(f"{where} {error}") from None
         else:

@@ -332,8 +332,7 @@ class Localiser(Replay):
             first, end = (math.floor((t - self.start[0]) / step) for t in (self._now, limit))
             grid = self.start[0] + step * np.arange(first + 1, end + 1)
             parts.append(grid[(grid > self._now) & (grid <= limit)])
-        times: Rows = np.unique(np.concatenate(parts))
-        return times
+        return np.unique(np.concatenate(parts))
 
     def _run(
         self, z: Rows, dt: Rows, motion: Rows, place: Rows
@@ -374,12 +373,8 @@ class Tracker(Replay):
 
     def __init__(self, log: LogFolder, settings: Settings, filter_name: FilterName) -> None:
         super().__init__(log, settings, filter_name)
-        fixes, process = settings.fixes, settings.process
-        self._process = ConstantAcceleration(
-            position_psd=process.position_psd,
-            velocity_psd=process.velocity_psd,
-            acceleration_psd=process.acceleration_psd,
-        )
+        fixes = settings.fixes
+        self._process = ConstantAcceleration(**vars(settings.process))
         self._sensor = RangeBearing(
             sigma_range_m=fixes.sigma_range_m,
             sigma_bearing_rad=fixes.sigma_bearing_rad,
@@ -510,8 +505,7 @@ class Tracker(Replay):
         k = np.searchsorted(at, time_s, side="right") - 1
         dt = (time_s - at[k])[:, None]
         half_square = 0.5 * dt * dt
-        position: Rows = states[k, 0:2] + dt * states[k, 2:4] + half_square * states[k, 4:6]
-        return position
+        return states[k, 0:2] + dt * states[k, 2:4] + half_square * states[k, 4:6]
 
 
 def _build(

@@ -47,8 +47,8 @@ def overview(result: Result) -> Figure:
 
 def tracks(result: Result) -> Figure:
     """Draw estimate, dead reckoning, truth and sources in the plane."""
-    figure = plots.new_figure((6.6, 5.6), "Tracks")
-    _tracks(figure.add_subplot(), result)
+    figure, axes = plots.new_axes((6.6, 5.6), "Tracks")
+    _tracks(axes, result)
     return figure
 
 
@@ -73,8 +73,7 @@ def innovations(result: Result) -> Figure:
 
 def nis(result: Result) -> Figure:
     """Draw the normalised innovation squared and its 95 % bound."""
-    figure = plots.new_figure(_WIDE, "Normalised innovation squared, before any weight")
-    axes = figure.add_subplot()
+    figure, axes = plots.new_axes(_WIDE, "Normalised innovation squared, before any weight")
     _nis(axes, result)
     axes.set_xlabel("time / s")
     return figure
@@ -82,8 +81,7 @@ def nis(result: Result) -> Figure:
 
 def weights(result: Result) -> Figure:
     """Draw the weights that the kernel gave, and what it rejected."""
-    figure = plots.new_figure(_WIDE, "Weights")
-    axes = figure.add_subplot()
+    figure, axes = plots.new_axes(_WIDE, "Weights")
     full, doubted = result.measurements.columns(), result.outliers.columns()
     axes.plot(full["time_s"], full["weight_0"], ".", color=plots.BLUE, markersize=3, label="weight")
     down = doubted["outcome"] == tables.DOWNWEIGHTED
@@ -96,20 +94,17 @@ def weights(result: Result) -> Figure:
         doubted["time_s"][away], np.zeros(int(away.sum())), "x", color=plots.VERMILION,
         markersize=6, label=tables.REJECTED,
     )  # fmt: skip
-    axes.set(xlabel="time / s", ylabel="weight", ylim=(-0.05, 1.08))
-    plots.style(axes)
+    plots.style(axes, xlabel="time / s", ylabel="weight", ylim=(-0.05, 1.08))
     _legend(axes)
     return figure
 
 
 def held_out(result: Result) -> Figure:
     """Draw how far the predictions of measurements that the filter did not get were off."""
-    figure = plots.new_figure(_WIDE, "Error of predicting held-out measurements")
-    axes = figure.add_subplot()
+    figure, axes = plots.new_axes(_WIDE, "Error of predicting held-out measurements")
     rows = result.measurements.columns()
     axes.plot(rows["time_s"], rows["held_out_error_m"], ".", color=plots.BLUE, markersize=3)
-    axes.set(xlabel="time / s", ylabel="error / m")
-    plots.style(axes)
+    plots.style(axes, xlabel="time / s", ylabel="error / m")
     return figure
 
 
@@ -124,9 +119,7 @@ def _tracks(axes: Axes, result: Result) -> None:
     axes.plot(*estimated, "-", color=plots.BLUE, linewidth=1.2, label="estimate")
     if len(result.sources):
         axes.plot(*result.sources.T, "^", color=plots.GREEN, linestyle="none", label="beacons")
-    axes.set(xlabel="x / m", ylabel="y / m")
-    axes.set_aspect("equal", adjustable="datalim")
-    plots.style(axes)
+    plots.style_plane(axes)
     _legend(axes)
 
 
@@ -140,8 +133,7 @@ def _errors(pair: tuple[Axes, Axes], result: Result) -> None:
         )  # fmt: skip
         axes.plot(rows["time_s"], rows[f"error_{name}_m"], color=plots.BLUE, linewidth=1.0,
                   label="error")  # fmt: skip
-        axes.set_ylabel(f"{name} error / m")
-        plots.style(axes)
+        plots.style(axes, ylabel=f"{name} error / m")
     _legend(pair[0])
     pair[1].set_xlabel("time / s")
 
@@ -162,9 +154,8 @@ def _innovation(axes: Axes, result: Result, m: int) -> None:
     if away.any():
         rejected = doubted["time_s"][away], doubted[f"innovation_{m}"][away]
         axes.plot(*rejected, "x", color=plots.VERMILION, markersize=5, label=tables.REJECTED)
-    axes.set_ylabel(("range / m", "bearing / rad")[m])
     _compress(axes, value, 4 * float(np.quantile(bound, 0.9)) if len(bound) else 1.0)
-    plots.style(axes)
+    plots.style(axes, ylabel=("range / m", "bearing / rad")[m])
     _legend(axes)
 
 
@@ -176,10 +167,8 @@ def _nis(axes: Axes, result: Result) -> None:
     axes.axhline(high, color=plots.BLACK, linewidth=0.9, linestyle="--",
                  label=f"95 % below {high:.2f}")  # fmt: skip
     _compress(axes, rows["nis"], 2 * high)
-    axes.set_ylabel("NIS")
     axes.margins(y=0.1)
-    axes.set_ylim(bottom=0.0)
-    plots.style(axes)
+    plots.style(axes, ylabel="NIS", ylim=(0.0, None))
     _legend(axes)
 
 

@@ -27,8 +27,7 @@ Complex = npt.NDArray[np.complex128]
 
 def phi(angle: Rows) -> Complex:
     """Chord of the unit arc that turns by ``angle``."""
-    chord: Complex = np.sinc(angle / (2 * np.pi)) * np.exp(0.5j * angle)
-    return chord
+    return np.sinc(angle / (2 * np.pi)) * np.exp(0.5j * angle)
 
 
 def dead_reckon(pose: Rows, chord: Complex, turn: Rows) -> Rows:
@@ -36,8 +35,7 @@ def dead_reckon(pose: Rows, chord: Complex, turn: Rows) -> Rows:
     heading = np.cumsum(np.concatenate([pose[0, 2:], turn]))
     steps = chord * np.exp(1j * heading[:-1])
     place = np.cumsum(np.concatenate([[complex(pose[0, 0], pose[0, 1])], steps]))
-    poses: Rows = np.column_stack([place.real, place.imag, heading])
-    return poses
+    return np.column_stack([place.real, place.imag, heading])
 
 
 @dataclass
@@ -150,5 +148,4 @@ def carry(segments: Segments, poses: Floats, at: Rows, time_s: Rows) -> Rows:
     k = np.searchsorted(at, time_s, side="right") - 1
     chord, _ = segments.steps(at[k], time_s - at[k])
     step = chord * np.exp(1j * poses[k, 2])
-    positions: Rows = poses[k, :2] + np.column_stack([step.real, step.imag])
-    return positions
+    return poses[k, :2] + np.column_stack([step.real, step.imag])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 from html import escape
+from importlib import resources
 from typing import Any
 
 from matplotlib import rc_context
@@ -12,38 +13,6 @@ from matplotlib import rc_context
 from auvest.replay import tables
 from auvest.replay.figures import figures
 from auvest.replay.run import Result
-
-# The policy lets the page load nothing but the pictures that are in it.
-_PAGE = """<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta http-equiv="Content-Security-Policy"
- content="default-src 'none'; img-src data:; style-src 'unsafe-inline'">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{title}</title>
-<style>
-body {{ font: 16px/1.5 system-ui, sans-serif; color: #222; max-width: 60rem; margin: 2rem auto;
-       padding: 0 1rem; }}
-h1 {{ font-size: 1.5rem; }} h2 {{ font-size: 1.15rem; margin-top: 2rem; }}
-table {{ border-collapse: collapse; }}
-td, th {{ padding: 0.2rem 0.9rem 0.2rem 0; text-align: left; border-bottom: 1px solid #ddd; }}
-td.number {{ text-align: right; font-variant-numeric: tabular-nums; }}
-img {{ max-width: 100%; height: auto; }}
-.warning {{ background: #fff3cd; padding: 0.5rem 0.8rem; }}
-</style>
-</head>
-<body>
-<h1>{title}</h1>
-{warnings}
-<h2>Figures of the run</h2>
-{numbers}
-{pictures}
-<h2>Settings</h2>
-{settings}
-</body>
-</html>
-"""
 
 
 def html(result: Result) -> str:
@@ -58,7 +27,9 @@ def html(result: Result) -> str:
         for key, value in values.items()
         if value is not None
     ]
-    return _PAGE.format(
+    # The page's policy lets it load nothing but the pictures that are in it.
+    template = resources.files("auvest.replay").joinpath("report.html")
+    return template.read_text(encoding="utf-8").format(
         title=escape(f"{result.name}: replay with {result.filter_name}"),
         warnings="\n".join(f'<p class="warning">{escape(text)}</p>' for text in warnings(result)),
         numbers=_table(rows(result)),

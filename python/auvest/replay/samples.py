@@ -44,9 +44,5 @@ class Samples:
 
     def columns(self) -> dict[str, npt.NDArray[Any]]:
         """Give what was kept."""
-        return {
-            name: np.concatenate([part[name] for part in self._parts if len(part[name])])
-            if any(len(part[name]) for part in self._parts)
-            else np.empty(0)
-            for name in self._parts[0]
-        }
+        parts = [part for part in self._parts if len(part["time_s"])] or self._parts[:1]
+        return {name: np.concatenate([part[name] for part in parts]) for name in self._parts[0]}

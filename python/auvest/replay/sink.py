@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
@@ -13,48 +12,52 @@ import pyarrow.parquet as pa_parquet
 
 from auvest.replay.tables import Columns
 
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
-class TableFiles:
+
+class _Sink:
+    """Closes its writers at the end of a ``with``; they are opened by the first batch."""
+
+    def __init__(self) -> None:
+        self._writers: list[Any] = []
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for writer in self._writers:
+            writer.close()
+
+
+class TableFiles(_Sink):
     """``<stem>.csv`` and ``<stem>.parquet`` in a folder, written a batch at a time.
 
     The Parquet file is readable after a clean end or an interruption, once it is closed.
     """
 
     def __init__(self, folder: Path, stem: str) -> None:
+        super().__init__()
         self.paths = (folder / f"{stem}.csv", folder / f"{stem}.parquet")
-        self._csv: Any = None
-        self._parquet: Any = None
 
     def write(self, columns: Columns) -> None:
         """Append rows; the first batch fixes names and types."""
         table = pa.table(dict(columns))
-        if self._csv is None:
-            self._csv = pa_csv.CSVWriter(self.paths[0], table.schema)
-            self._parquet = pa_parquet.ParquetWriter(self.paths[1], table.schema)
-        if len(table):
-            self._csv.write_table(table)
-            self._parquet.write_table(table)
-
-    def __enter__(self) -> TableFiles:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        if self._csv is not None:
-            self._csv.close()
-            self._parquet.close()
+        if not self._writers:
+            self._writers = [
+                pa_csv.CSVWriter(self.paths[0], table.schema),
+                pa_parquet.ParquetWriter(self.paths[1], table.schema),
+            ]
+        for writer in self._writers if len(table) else ():
+            writer.write_table(table)
 
 
-class TumFile:
+class TumFile(_Sink):
     """A trajectory as TUM text, ``time x y z qx qy qz qw`` per line, for tools such as evo."""
 
     def __init__(self, path: Path) -> None:
+        super().__init__()
         self.path = path
-        self._writer: Any = None
 
     def write(self, estimates: Columns) -> None:
         """Append the poses of a table of estimates."""
@@ -72,20 +75,8 @@ class TumFile:
                 "qw": np.cos(0.5 * heading),
             }
         )
-        if self._writer is None:
+        if not self._writers:
             options = pa_csv.WriteOptions(include_header=False, delimiter=" ")
-            self._writer = pa_csv.CSVWriter(self.path, table.schema, write_options=options)
+            self._writers = [pa_csv.CSVWriter(self.path, table.schema, write_options=options)]
         if len(table):
-            self._writer.write_table(table)
-
-    def __enter__(self) -> TumFile:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        if self._writer is not None:
-            self._writer.close()
+            self._writers[0].write_table(table)

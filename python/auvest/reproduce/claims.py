@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
-from importlib import resources
 from typing import Any, Generic, TypeVar
 
+from auvest import _texts
 from auvest.reproduce import markdown
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 T = TypeVar("T")
 
@@ -48,14 +42,12 @@ class Claims(Generic[T]):
     """
 
     def __init__(self, module: str, make: Callable[..., T]) -> None:
-        file = resources.files(module.rpartition(".")[0]).joinpath("claims.toml")
-        self._texts: dict[str, dict[str, str]] = tomllib.loads(file.read_text(encoding="utf-8"))
+        self._texts = _texts.read(module.rpartition(".")[0], "claims.toml")
         self._make = make
 
     def __call__(self, name: str, verdict: object, /, **values: Any) -> T:
         """Fill the places of the texts of that name."""
-        texts = (" ".join(text.split()) for text in self._texts[name].values())
-        return self._make(*(text.format(**values) for text in texts), verdict)
+        return self._make(*_texts.filled(self._texts[name], values).values(), verdict)
 
 
 def graded(yes: bool = False, *, partly: bool = False) -> str:

@@ -8,25 +8,30 @@ this project's own reference case. The loop is C++
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
+from functools import partial
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from auvest import _core, metrics, montecarlo
-from auvest._arguments import (
-    as_flag,
-    as_instance,
-    as_integer,
-    as_kind,
-    as_number,
-    as_pair,
+from auvest._arguments import as_instance, as_integer, as_kind, as_number
+from auvest._fields import (
+    Checked,
+    choice,
+    flag,
+    fraction,
+    instance,
+    integer,
+    not_negative,
+    pair,
+    positive,
 )
-from auvest._core import Status
 from auvest.filters import Ekf, RobustEkf, RobustUkf, Ukf
 from auvest.kernels import Kernel, KernelName, RejectionStreak
 from auvest.models import LeaderRange, SpeedHeading
+from auvest.scenarios._runs import Runs, collect, only_sensor, standard_error
 
 _DEFAULTS = _core.cooperative_defaults()
 _STREAK = RejectionStreak()
@@ -46,15 +51,8 @@ NOISE_KINDS: tuple[NoiseKind, ...] = ("contaminated", "multipath", "student")
 TIMINGS: tuple[Timing, ...] = ("at-once", "own-time", "as-if-fresh")
 
 
-def _as_probability(model: object, name: str) -> float:
-    value = as_number(name, getattr(model, name), "not negative")
-    if value > 1:
-        raise ValueError(f"{name} must lie in 0..1, not {value}")
-    return value
-
-
 @dataclass(frozen=True, kw_only=True)
-class RangeNoise:
+class RangeNoise(Checked):
     """Errors of the ranges.
 
     Parameters
@@ -73,24 +71,15 @@ class RangeNoise:
         Of Student's t, 1..100.
     """
 
-    kind: NoiseKind = "contaminated"
-    sigma_m: float = _DEFAULTS["sigma_m"]
-    outlier_fraction: float = _DEFAULTS["outlier_fraction"]
-    outlier_sigma_m: float = _DEFAULTS["outlier_sigma_m"]
-    degrees_of_freedom: int = _DEFAULTS["degrees_of_freedom"]
-
-    def __post_init__(self) -> None:
-        as_kind("kind", self.kind, NOISE_KINDS)
-        set_field = object.__setattr__
-        for name in ("sigma_m", "outlier_sigma_m"):
-            set_field(self, name, as_number(name, getattr(self, name), "positive"))
-        set_field(self, "outlier_fraction", _as_probability(self, "outlier_fraction"))
-        dof = as_integer("degrees_of_freedom", self.degrees_of_freedom, 1, 100)
-        set_field(self, "degrees_of_freedom", dof)
+    kind: NoiseKind = choice(*NOISE_KINDS)
+    sigma_m: float = positive(_DEFAULTS["sigma_m"])
+    outlier_fraction: float = fraction(_DEFAULTS["outlier_fraction"])
+    outlier_sigma_m: float = positive(_DEFAULTS["outlier_sigma_m"])
+    degrees_of_freedom: int = integer(_DEFAULTS["degrees_of_freedom"], 1, 100)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Scenario:
+class Scenario(Checked):
     """What is simulated beside the filter.
 
     Parameters
@@ -123,47 +112,30 @@ class Scenario:
         Error of the start that the filter does not know of, m.
     """
 
-    noise: RangeNoise = field(default_factory=RangeNoise)
-    timing: Timing = "at-once"
-    dropout: float = 0.0
-    late: float = 0.0
-    late_steps: int = _DEFAULTS["late_steps"]
-    sigma_speed: float = _DEFAULTS["sigma_speed"]
-    sigma_heading: float = _DEFAULTS["sigma_heading"]
-    range_every: int = _DEFAULTS["range_every"]
-    steps: int = PAPER_STEPS
-    runs: int = 50
-    seed: int = 1
-    random_start: bool = False
-    offset_m: tuple[float, float] = (0.0, 0.0)
+    noise: RangeNoise = instance(RangeNoise)
+    timing: Timing = choice(*TIMINGS)
+    dropout: float = fraction(0.0)
+    late: float = fraction(0.0)
+    late_steps: int = integer(_DEFAULTS["late_steps"], 1, _DEFAULTS["most_late_steps"])
+    sigma_speed: float = not_negative(_DEFAULTS["sigma_speed"])
+    sigma_heading: float = not_negative(_DEFAULTS["sigma_heading"])
+    range_every: int = integer(_DEFAULTS["range_every"], 1, 10)
+    steps: int = integer(PAPER_STEPS, 1, MAX_SAMPLES)
+    runs: int = integer(50, 1, MAX_SAMPLES)
+    seed: int = integer(1, 0, 2**64 - 1)
+    random_start: bool = flag(False)
+    offset_m: tuple[float, float] = pair((0.0, 0.0))
 
     def __post_init__(self) -> None:
-        as_instance("noise", self.noise, RangeNoise)
-        as_kind("timing", self.timing, TIMINGS)
-        as_flag("random_start", self.random_start)
-        set_field = object.__setattr__
-        for name in ("dropout", "late"):
-            set_field(self, name, _as_probability(self, name))
-        for name in ("sigma_speed", "sigma_heading"):
-            set_field(self, name, as_number(name, getattr(self, name), "not negative"))
-        limits = {
-            "late_steps": (1, _DEFAULTS["most_late_steps"]),
-            "range_every": (1, 10),
-            "steps": (1, MAX_SAMPLES),
-            "runs": (1, MAX_SAMPLES),
-            "seed": (0, 2**64 - 1),
-        }
-        for name, (low, high) in limits.items():
-            set_field(self, name, as_integer(name, getattr(self, name), low, high))
+        super().__post_init__()
         if self.runs * self.steps > MAX_SAMPLES:
             raise ValueError(
                 f"runs * steps must be at most {MAX_SAMPLES}, not {self.runs} * {self.steps}"
             )
-        set_field(self, "offset_m", as_pair("offset_m", self.offset_m))
 
 
 @dataclass(frozen=True)
-class Result:
+class Result(Runs):
     """What :func:`simulate` returns. Rows after the end of a run are NaN.
 
     Attributes
@@ -208,29 +180,15 @@ class Result:
     scenario: Scenario
 
     @property
-    def failed(self) -> npt.NDArray[np.bool_]:
-        """Runs whose status is not ok, shape (runs,)."""
-        failed: npt.NDArray[np.bool_] = self.status != int(Status.ok)
-        return failed
-
-    @property
     def rmse_per_run_m(self) -> npt.NDArray[np.float64]:
         """Root mean square position error of each run, m, shape (runs,)."""
         square = np.square(self.error).sum(axis=-1)
         return np.array([np.sqrt(row[~np.isnan(row)].mean()) for row in square])
 
     @property
-    def rmse_m(self) -> float:
-        """Root mean square position error over all runs, m."""
-        return metrics.rmse(self.error)
-
-    @property
     def rmse_standard_error_m(self) -> float:
         """Standard error of ``rmse_m``, m; NaN for one run."""
-        square = np.square(self.rmse_per_run_m)
-        if len(square) < 2:
-            return float("nan")
-        return float(square.std(ddof=1) / np.sqrt(len(square)) / (2 * self.rmse_m))
+        return standard_error(np.square(self.rmse_per_run_m)) / (2 * self.rmse_m)
 
     @property
     def nees(self) -> npt.NDArray[np.float64]:
@@ -328,29 +286,21 @@ def simulate(
     as_instance("scenario", scenario, Scenario)
     if not isinstance(filter.process, SpeedHeading) or len(filter.x) != 2:
         raise ValueError(f"filter must have a SpeedHeading of two states, not {filter.process}")
-    sensors = list(filter.sensors.values())
-    if len(sensors) != 1 or not isinstance(sensors[0], LeaderRange):
-        raise ValueError(f"filter must have one LeaderRange as its sensor, not {sensors}")
+    sensor = only_sensor(filter, LeaderRange).core(2, filter.dtype)
     core = filter._core_filter(None)
-    sensor = sensors[0].core(2, filter.dtype)
     core.reset(filter.x, filter.P, filter.x)
 
     def part(first: int, count: int) -> dict[str, npt.NDArray[Any]]:
         return _core.cooperate(core, sensor, _as_core(scenario, first, count))
 
-    try:
-        columns = montecarlo.run(
-            part,
-            runs=scenario.runs,
-            chunk=montecarlo.chunk_for(scenario.runs, scenario.steps, workers),
-            workers=workers,
-            progress=progress,
-        )
-    except montecarlo.Interrupted as stop:
-        if stop.partial is not None:
-            stop.partial = Result(**stop.partial, scenario=scenario)
-        raise
-    return Result(**columns, scenario=scenario)
+    return collect(
+        partial(Result, scenario=scenario),
+        part,
+        scenario.runs,
+        chunk=montecarlo.chunk_for(scenario.runs, scenario.steps, workers),
+        workers=workers,
+        progress=progress,
+    )
 
 
 def _as_core(scenario: Scenario, first: int, count: int) -> dict[str, Any]:

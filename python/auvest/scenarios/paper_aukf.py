@@ -6,8 +6,7 @@ leaves much open; every choice stands in :data:`ASSUMPTIONS` with its reason.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +21,7 @@ from auvest import (
     Ukf,
 )
 from auvest.intervals import IntervalPolicy
+from auvest.scenarios.assumptions import read_assumptions
 from auvest.scenarios.tracking import Noise, Track
 
 FilterName: TypeAlias = Literal["ekf", "ukf", "aukf"]
@@ -43,16 +43,6 @@ TAU0_STUDIED = (0.1, 0.3, 0.5, 0.9)
 # Not in the paper: see ASSUMPTIONS.
 P0_SIGMA = (0.05, 0.02, 0.005)
 TURN_RATE_RAD_S = 0.05
-
-
-@dataclass(frozen=True)
-class Assumption:
-    """One thing the paper leaves open: what we chose, and why."""
-
-    quantity: str
-    paper: str
-    ours: str
-    reason: str
 
 
 def paper_noise(
@@ -136,20 +126,13 @@ def paper_filter(
     process = ConstantAcceleration(discretisation="euler" if track == "paper" else "exact")
     sigma_range_m, sigma_bearing_rad = noise.standard_deviation
     sensor = RangeBearing(sigma_range_m=sigma_range_m, sigma_bearing_rad=sigma_bearing_rad)
+    options: dict[str, Any] = {"process": process, "sensors": sensor, "dtype": dtype}
     if name == "ekf":
-        return Ekf(x0, P0, process=process, sensors=sensor, dtype=dtype)
-    points = {"alpha": alpha, "beta": beta, "kappa": kappa}
+        return Ekf(x0, P0, **options)
+    options.update(alpha=alpha, beta=beta, kappa=kappa)
     if name == "ukf":
-        return Ukf(x0, P0, process=process, sensors=sensor, dtype=dtype, **points)
-    return Aukf(
-        x0,
-        P0,
-        process=process,
-        sensors=sensor,
-        policy=MahalanobisInterval() if policy is None else policy,
-        dtype=dtype,
-        **points,
-    )
+        return Ukf(x0, P0, **options)
+    return Aukf(x0, P0, policy=policy or MahalanobisInterval(), **options)
 
 
 def observed_positions(
@@ -173,147 +156,14 @@ def observed_positions(
     return np.stack([station[0] + r * np.cos(bearing), station[1] + r * np.sin(bearing)], axis=-1)
 
 
-_SIGMA_P, _SIGMA_V, _SIGMA_A = P0_SIGMA
-_PROCESS = ConstantAcceleration(discretisation="euler")
-_MEASUREMENT = RangeBearing()
-_LAW = MahalanobisInterval()
-_NOISE = paper_noise()
-_TRACK = paper_track()
-
 #: Everything the simulation needs and the paper does not say, or says in two ways.
-ASSUMPTIONS: tuple[Assumption, ...] = (
-    Assumption(
-        "Start of the filter, x0",
-        "position, speed and acceleration in Table 1",
-        f"the true start: {_TRACK.position} m, {_TRACK.velocity} m/s, {_TRACK.acceleration} m/s^2",
-        "Table 1 gives them, and the vehicle is launched from the station",
-    ),
-    Assumption(
-        "Direction of speed and acceleration",
-        "not stated; sizes 0.224 m/s and 0.0224 m/s^2",
-        f"components {_TRACK.velocity} m/s and {_TRACK.acceleration} m/s^2, a straight line",
-        "0.224 = |(0.1, 0.2)| and 0.0224 = |(0.01, 0.02)| to the printed digits",
-    ),
-    Assumption(
-        "Covariance of the start, P0",
-        "not stated",
-        f"standard deviations {_SIGMA_P} m, {_SIGMA_V} m/s, {_SIGMA_A} m/s^2",
-        "launched from the deck: position known to the range sensor's noise, speed and "
-        "acceleration to a fraction of their size. With an exact x0 any P0 is pessimistic; a much "
-        "larger one lets the first estimates jump (see finding 3)",
-    ),
-    Assumption(
-        "Process noise, Q",
-        "not stated; w in Eq. (4)",
-        f"T diag(q), q = {_PROCESS.position_psd:g} m^2/s, {_PROCESS.velocity_psd:g} m^2/s^3, "
-        f"{_PROCESS.acceleration_psd:g} m^2/s^5 (the package's defaults)",
-        "the simulated truth follows Eq. (4) without noise, so even 0 would be consistent; these "
-        "values let the speed wander by 1 cm/s in one second, which a real vehicle needs, and "
-        "leave NIS and NEES a little below 2",
-    ),
-    Assumption(
-        "Measurement noise, R",
-        "not stated",
-        "the variances of the simulated noise, without its bias",
-        "the filter knows its sensors; a zero-mean model is all that Eq. (6) offers",
-    ),
-    Assumption(
-        "Size of the noise",
-        "uniform, Gaussian and logarithmic noise '(0, 1)' in metres",
-        f"scaled to {_NOISE.range_m} m and {_NOISE.bearing_rad} rad in the figures; the paper's "
-        "size in finding 3",
-        "with noise of 1 m the figures cannot be reproduced",
-    ),
-    Assumption(
-        "How the noise maps to range and bearing",
-        "not stated; one '(0, 1)' for both, 'in metres'",
-        "independent draws of the same kind for range and bearing, each with its own scale",
-        "Eq. (6) has v_r and v_phi; one unit cannot serve both",
-    ),
-    Assumption(
-        "Bias of uniform and logarithmic noise",
-        "not mentioned",
-        "kept, as in the paper; also measured with the mean removed",
-        "U(0, 1) has mean 0.5, exp(N(0, 1)) has mean 1.65 and standard deviation 2.16",
-    ),
-    Assumption(
-        "'Logarithmic' noise",
-        "'log noise, mean and variance (0, 1)'",
-        "exp(N(0, 1)): the logarithm has mean 0 and variance 1",
-        "the usual lognormal distribution",
-    ),
-    Assumption(
-        "Shortest interval, T_min",
-        "named, value not stated",
-        f"{_LAW.min_s} s (preset figure3), {MahalanobisInterval('table1').min_s} s (preset table1)",
-        "far below both 0.5 s and what the law settles at, and above what an ATmega2560 needs for "
-        "a step; table1: below the 0.018 s of finding 1, so that T_min hides nothing",
-    ),
-    Assumption(
-        "gamma1, gamma2",
-        "10 and 100 in Table 1",
-        f"{_LAW.gamma1_m2:g} m^2 and {_LAW.gamma2:g} (preset figure3); Table 1's in preset table1",
-        "Table 1 and Fig. 3 exclude each other, finding 1",
-    ),
-    Assumption(
-        "Order inside a step",
-        "circular as printed: (8) needs tau(k), (12) gives tau(k+1)",
-        "update, M(k), T(k) with the tau in hand, d(k), tau(k+1); T(k) leads to the next sample",
-        "the only causal reading",
-    ),
-    Assumption(
-        "Limits of M and tau",
-        "0 < M < 0.9 and tau in (0, 1)",
-        f"M clamped to 0..{_LAW.ratio_max}, tau to {_LAW.tau_min}..{_LAW.tau_max}",
-        "Eqs. (7) and (12) alone keep neither",
-    ),
-    Assumption(
-        "(d)_2 in Eq. (12)",
-        "printed as a subscript",
-        "d^2, the squared Mahalanobis distance",
-        "a subscript has no meaning there; d itself would be 1.22 where d^2 is 1.5",
-    ),
-    Assumption(
-        "Divisor of cov in Eq. (10)",
-        "'cov' only",
-        "N - 1 = 3",
-        "the default of the usual programs; with N = 4, d^2 is 4/3 as large",
-    ),
-    Assumption(
-        "Singular covariance in Eq. (11)",
-        "not mentioned; singular at the start and on noise-free straight legs",
-        "machine epsilon times its trace is added to its diagonal",
-        "gives the distance along the line there, and changes nothing elsewhere",
-    ),
-    Assumption(
-        "Reference track R(k)",
-        "'true desired' track",
-        "the truth, moved by Eq. (4) with the filter's own T(k), without noise",
-        "in the paper's figures reference and observation shift with tau(0)",
-    ),
-    Assumption(
-        "Sigma points for the update",
-        "not stated",
-        "redrawn from the predicted mean and covariance",
-        "the process is linear, so the prediction is exact in closed form",
-    ),
-    Assumption(
-        "Arctangent in Eq. (6)",
-        "arctan",
-        "atan2, innovations wrapped to (-pi, pi]",
-        "arctan folds the plane",
-    ),
-    Assumption(
-        "Measurement at the station",
-        "start and station are the same point: range 0, no bearing",
-        f"position form while the range is below {_MEASUREMENT.near_field:g} standard deviations "
-        "of the position",
-        "there a bearing has no useful slope; see docs/algorithms",
-    ),
-    Assumption(
-        "Number of runs",
-        "one",
-        "means over many runs, with standard errors",
-        "one run cannot rank two filters",
-    ),
+ASSUMPTIONS = read_assumptions(
+    __name__,
+    track=paper_track(),
+    sigma=P0_SIGMA,
+    process=ConstantAcceleration(discretisation="euler"),
+    noise=paper_noise(),
+    sensor=RangeBearing(),
+    law=MahalanobisInterval(),
+    table1=MahalanobisInterval("table1"),
 )

@@ -8,11 +8,12 @@ configuration R1 of docs/algorithms/slatf.md.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
-from auvest.scenarios.paper_aukf import Assumption, DTypeName
+from auvest.scenarios.assumptions import read_assumptions
+from auvest.scenarios.paper_aukf import DTypeName
 from auvest.scenarios.slat import SlatScenario
 from auvest.slat import DeadReckoning, EkfSlat, Slatf, SlatFilter, SlatfJoint
 from auvest.slat.models import PiecewiseAcceleration
@@ -77,9 +78,9 @@ def paper_filter(
     *,
     particles: int = PARTICLES,
     compensate_bias: bool = True,
-    carry_covariance: bool = False,
     acceleration_m_s2: float = PiecewiseAcceleration().acceleration_m_s2,
     dtype: DTypeName = "float64",
+    **options: Any,
 ) -> SlatFilter:
     """Set up a filter as the scenario needs it: it knows the noise of all sensors.
 
@@ -91,12 +92,12 @@ def paper_filter(
         Of SLATF 1.0, 2.0 and joint.
     compensate_bias : bool
         Make up for the bias of the heading's noise, except in "dr".
-    carry_covariance : bool
-        Eq. (50) to the letter, in "slatf2".
     acceleration_m_s2 : float
         q of the master's model.
     dtype : {"float64", "float32"}
         Precision.
+    **options
+        Of the filter that hears echoes, beside its models.
     """
     x0 = np.array([scenario.slave.x_m, scenario.slave.y_m])
     P0 = np.zeros((2, 2))
@@ -104,140 +105,22 @@ def paper_filter(
     if name in ("dr", "dr_compensated"):
         return DeadReckoning(x0, P0, motion=motion, dtype=dtype)
     master = PiecewiseAcceleration(acceleration_m_s2=acceleration_m_s2)
+    options.update(motion=motion, master=master, sonar=scenario.sonar, dtype=dtype)
     if name == "ekf_slat":
-        return EkfSlat(x0, P0, motion=motion, master=master, sonar=scenario.sonar, dtype=dtype)
+        return EkfSlat(x0, P0, **options)
     if name == "slatf_joint":
-        return SlatfJoint(
-            x0,
-            P0,
-            particles=particles,
-            motion=motion,
-            master=master,
-            sonar=scenario.sonar,
-            dtype=dtype,
-        )
-    return Slatf(
-        x0,
-        P0,
-        version=1 if name == "slatf1" else 2,
-        particles=particles,
-        motion=motion,
-        master=master,
-        sonar=scenario.sonar,
-        carry_covariance=carry_covariance,
-        dtype=dtype,
-    )
+        masters = len(scenario.masters)
+        return SlatfJoint(x0, P0, particles=particles, max_masters=masters, **options)
+    return Slatf(x0, P0, particles=particles, version=1 if name == "slatf1" else 2, **options)
 
 
 _R1 = SlatScenario()
-_MASTER = _R1.masters[0]
-_Q = PiecewiseAcceleration().acceleration_m_s2
 
 #: Everything the simulation needs and the paper does not say, or says in two ways.
-ASSUMPTIONS: tuple[Assumption, ...] = (
-    Assumption(
-        "Rate of the odometry",
-        "T^S = T^M; only the sonar's 2 s are given",
-        f"a reading every {_R1.odometry_s:g} s, an echo every "
-        f"{_R1.odometry_s * _R1.odometry_per_ping:g} s",
-        "dead reckoning at 1 Hz gives Table 1's 58.6 m; at 0.5 Hz it gives 67 m",
-    ),
-    Assumption(
-        "Start of the vehicles",
-        "not stated",
-        f"slave at ({_R1.slave.x_m:g}, {_R1.slave.y_m:g}) m, master at ({_MASTER.x_m:g}, "
-        f"{_MASTER.y_m:g}) m",
-        "not legible in Fig. 2; errors depend on it through the range only",
-    ),
-    Assumption(
-        "What the slave is told of the master when communication breaks",
-        "not stated",
-        f"position to {_R1.prior_position_m:g} m, velocity to {_R1.prior_velocity_m_s:g} m/s, "
-        f"acceleration to {_R1.prior_acceleration_m_s2:g} m/s^2, drawn accordingly",
-        "the velocity decides how good any filter can be, see Sensitivity",
-    ),
-    Assumption(
-        "What the slave is told of itself",
-        "not stated",
-        "its position, exactly",
-        "all errors are those of the outage",
-    ),
-    Assumption(
-        "u(k) of the master",
-        "known in Eq. (15); 'no information is exchanged' elsewhere",
-        "known: the true velocity change of every second, a plan from before the outage",
-        "Eq. (15) needs it; what the filters lose without it is under Sensitivity",
-    ),
-    Assumption(
-        "Phi, E, G and Q of the master",
-        "left to a reference",
-        f"exact Phi with t^2/2, E u = [t/2 u, u, 0], G = [t^2/2, t, 1], q = {_Q:g} m/s^2",
-        "the usual model of that state",
-    ),
-    Assumption(
-        "Process noise of the true master",
-        "not stated",
-        "none: straight, then a steady turn, as Fig. 2 draws it",
-        "Fig. 2",
-    ),
-    Assumption(
-        "Noise of the readings",
-        "V_k = V_mk + w",
-        "measured = true + noise, independent from reading to reading",
-        "the other sign has the same distribution; a bias would make 400 s of it 100 m",
-    ),
-    Assumption(
-        "Noise of the levels",
-        "not stated; dead reckoning differs from level to level",
-        "each level draws its own; all filters of a level meet the same",
-        "as Table 1 shows it; filters are compared run by run",
-    ),
-    Assumption(
-        "Bias of the heading's noise",
-        "not mentioned; in the paper's dead reckoning",
-        "made up for in the filters and in a second dead reckoning, left in the first",
-        "E[cos(phi + w)] = exp(-0.3^2 / 2) cos(phi): 4.4 %, some 90 m in 400 s",
-    ),
-    Assumption(
-        "State of the slave",
-        "x, y and a heading that feeds nothing",
-        "x, y",
-        "Eq. (2) moves the position by the measured heading",
-    ),
-    Assumption(
-        "Resampling",
-        "'resample below a threshold'",
-        "systematic, below N_eff = N / 2",
-        "the usual choice",
-    ),
-    Assumption(
-        "Covariance of the pose, Eq. (50)",
-        "carried, although the particle (9) has none",
-        "G Q G' gathered since the last draw; the paper's reading under Sensitivity",
-        "a drawn pose is a point, as in FastSLAM 2.0",
-    ),
-    Assumption(
-        "Signs and factors of Eqs. (54) and (65)",
-        "exp(+1/2 ...), old weight dropped, -G_S X_S missing",
-        "exp(-1/2 ...), times the old weight, with -G_S X_S",
-        "misprints, see docs/algorithms/slatf.md",
-    ),
-    Assumption(
-        "RMSE",
-        "not defined",
-        "root mean square over the pings of a run, averaged over the runs",
-        "the usual definition",
-    ),
-    Assumption(
-        "Mean and variance of the error, Figs 3 and 6",
-        "not defined",
-        "of the distance between estimate and truth, over pings and runs",
-        "one number per level",
-    ),
-    Assumption(
-        "Error over time, Figs 4 and 5",
-        "not defined",
-        "root mean square over the runs at each ping",
-        "one run cannot rank filters",
-    ),
+ASSUMPTIONS = read_assumptions(
+    __name__,
+    scenario=_R1,
+    master=_R1.masters[0],
+    ping_s=_R1.odometry_s * _R1.odometry_per_ping,
+    q=PiecewiseAcceleration().acceleration_m_s2,
 )

@@ -8,16 +8,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from auvest import _core, metrics, montecarlo
-from auvest._arguments import as_flag, as_instance, as_integer, as_number
-from auvest._core import Status
+from auvest import _core, metrics
+from auvest._arguments import as_instance, as_integer
+from auvest._fields import (
+    Checked,
+    flag,
+    fraction,
+    instance,
+    integer,
+    not_negative,
+    number,
+    positive,
+)
+from auvest.scenarios._runs import Runs, collect, standard_error
 from auvest.slat import MAX_MASTERS, DeadReckoning, EkfSlat, Slatf, SlatFilter, SlatfJoint
 from auvest.slat.models import CompassMotion, Sonar, core_sonar
 
@@ -32,7 +43,7 @@ Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Vehicle:
+class Vehicle(Checked):
     """A vehicle that goes straight at constant speed and, from a time on, turns at a constant rate.
 
     Parameters
@@ -49,26 +60,22 @@ class Vehicle:
         Positive towards +y; 0: it never turns.
     """
 
-    x_m: float = _SLAVE["x_m"]
-    y_m: float = _SLAVE["y_m"]
-    heading_rad: float = _SLAVE["heading_rad"]
-    speed_m_s: float = _SLAVE["speed_m_s"]
-    turn_start_s: float = _SLAVE["turn_start_s"]
-    turn_rate_rad_s: float = _SLAVE["turn_rate_rad_s"]
-
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            object.__setattr__(self, field.name, as_number(field.name, getattr(self, field.name)))
+    x_m: float = number(_SLAVE["x_m"])
+    y_m: float = number(_SLAVE["y_m"])
+    heading_rad: float = number(_SLAVE["heading_rad"])
+    speed_m_s: float = number(_SLAVE["speed_m_s"])
+    turn_start_s: float = number(_SLAVE["turn_start_s"])
+    turn_rate_rad_s: float = number(_SLAVE["turn_rate_rad_s"])
 
 
 def paper_masters(count: int = 1) -> tuple[Vehicle, ...]:
     """Make the paper's master, and up to three more at other distances on the same course."""
-    number = as_integer("count", count, 1, MAX_MASTERS)
-    return tuple(Vehicle(**vehicle) for vehicle in _DEFAULTS["masters"][:number])
+    as_integer("count", count, 1, MAX_MASTERS)
+    return tuple(Vehicle(**vehicle) for vehicle in _DEFAULTS["masters"][:count])
 
 
 @dataclass(frozen=True, kw_only=True)
-class SlatScenario:
+class SlatScenario(Checked):
     """What is simulated.
 
     Parameters
@@ -105,51 +112,34 @@ class SlatScenario:
         the same noise.
     """
 
-    slave: Vehicle = Vehicle()
+    slave: Vehicle = instance(Vehicle)
     masters: tuple[Vehicle, ...] = paper_masters()
-    duration_s: float = _PARAMS["duration_s"]
-    odometry_s: float = _PARAMS["odometry_s"]
-    odometry_per_ping: int = _PARAMS["odometry_per_ping"]
-    sigma_speed_m_s: float = _PARAMS["sigma_speed_m_s"]
-    sigma_heading_rad: float = _PARAMS["sigma_heading_rad"]
-    sigma_range_m: float = _PARAMS["sigma_range_m"]
-    sigma_bearing_rad: float = _PARAMS["sigma_bearing_rad"]
-    dropout: float = _PARAMS["dropout"]
-    outlier: float = _PARAMS["outlier"]
-    outlier_sigmas: float = _PARAMS["outlier_sigmas"]
-    silent_from_s: float = _PARAMS["silent_from_s"]
-    silent_to_s: float = _PARAMS["silent_to_s"]
-    identified: bool = _PARAMS["identified"]
-    plan_known: bool = _PARAMS["plan_known"]
-    prior_position_m: float = _PARAMS["prior_position_m"]
-    prior_velocity_m_s: float = _PARAMS["prior_velocity_m_s"]
-    prior_acceleration_m_s2: float = _PARAMS["prior_acceleration_m_s2"]
-    runs: int = 50
-    seed: int = 1
+    duration_s: float = positive(_PARAMS["duration_s"])
+    odometry_s: float = positive(_PARAMS["odometry_s"])
+    odometry_per_ping: int = integer(_PARAMS["odometry_per_ping"], 1, 10**6)
+    sigma_speed_m_s: float = not_negative(_PARAMS["sigma_speed_m_s"])
+    sigma_heading_rad: float = not_negative(_PARAMS["sigma_heading_rad"])
+    sigma_range_m: float = positive(_PARAMS["sigma_range_m"])
+    sigma_bearing_rad: float = positive(_PARAMS["sigma_bearing_rad"])
+    dropout: float = fraction(_PARAMS["dropout"])
+    outlier: float = fraction(_PARAMS["outlier"])
+    outlier_sigmas: float = not_negative(_PARAMS["outlier_sigmas"])
+    silent_from_s: float = not_negative(_PARAMS["silent_from_s"])
+    silent_to_s: float = not_negative(_PARAMS["silent_to_s"])
+    identified: bool = flag(_PARAMS["identified"])
+    plan_known: bool = flag(_PARAMS["plan_known"])
+    prior_position_m: float = positive(_PARAMS["prior_position_m"])
+    prior_velocity_m_s: float = positive(_PARAMS["prior_velocity_m_s"])
+    prior_acceleration_m_s2: float = positive(_PARAMS["prior_acceleration_m_s2"])
+    runs: int = integer(50, 1, MAX_PINGS)
+    seed: int = integer(1, 0, 2**64 - 1)
 
     def __post_init__(self) -> None:
-        set_field = object.__setattr__
-        as_instance("slave", self.slave, Vehicle)
+        super().__post_init__()
         if not isinstance(self.masters, tuple) or not 1 <= len(self.masters) <= MAX_MASTERS:
             raise ValueError(f"masters must be a tuple of 1 to {MAX_MASTERS} Vehicle")
         for n, master in enumerate(self.masters):
             as_instance(f"masters[{n}]", master, Vehicle)
-        for name in ("identified", "plan_known"):
-            as_flag(name, getattr(self, name))
-        sonar = ("sigma_range_m", "sigma_bearing_rad")
-        prior = ("prior_position_m", "prior_velocity_m_s", "prior_acceleration_m_s2")
-        for name in ("duration_s", "odometry_s", *sonar, *prior):
-            set_field(self, name, as_number(name, getattr(self, name), "positive"))
-        others = ("sigma_speed_m_s", "sigma_heading_rad", "dropout", "outlier", "outlier_sigmas")
-        for name in (*others, "silent_from_s", "silent_to_s"):
-            set_field(self, name, as_number(name, getattr(self, name), "not negative"))
-        for name in ("dropout", "outlier"):
-            if getattr(self, name) > 1:
-                raise ValueError(f"{name} must lie in 0..1, not {getattr(self, name)}")
-        per_ping = as_integer("odometry_per_ping", self.odometry_per_ping, 1, 10**6)
-        set_field(self, "odometry_per_ping", per_ping)
-        set_field(self, "runs", as_integer("runs", self.runs, 1, MAX_PINGS))
-        set_field(self, "seed", as_integer("seed", self.seed, 0, 2**64 - 1))
         if not 1 <= self.pings <= MAX_PINGS // self.runs:
             raise ValueError(
                 f"duration_s gives {self.pings} pings per run; runs * pings must lie in "
@@ -184,7 +174,7 @@ _SCENARIO = SlatScenario()
 
 
 @dataclass(frozen=True)
-class SlatResult:
+class SlatResult(Runs):
     """What :func:`simulate` returns. Pings after a failure are NaN.
 
     Attributes
@@ -230,22 +220,14 @@ class SlatResult:
     scenario: SlatScenario
 
     @property
-    def failed(self) -> npt.NDArray[np.bool_]:
-        """Runs whose status is not ok, shape (runs,)."""
-        failed: npt.NDArray[np.bool_] = self.status != int(Status.ok)
-        return failed
-
-    @property
     def distance_m(self) -> Floats:
         """Length of the error of the slave's position, m, shape (runs, pings)."""
-        distance: Floats = np.sqrt(np.square(self.error).sum(axis=-1))
-        return distance
+        return np.sqrt(np.square(self.error).sum(axis=-1))
 
     @property
     def run_rmse_m(self) -> Floats:
         """Root mean square over time of each run, m, shape (runs,)."""
-        per_run: Floats = np.sqrt(np.nanmean(np.square(self.distance_m), axis=1))
-        return per_run
+        return np.sqrt(np.nanmean(np.square(self.distance_m), axis=1))
 
     @property
     def rmse_m(self) -> float:
@@ -255,8 +237,7 @@ class SlatResult:
     @property
     def rmse_standard_error_m(self) -> float:
         """Standard error of :attr:`rmse_m`; NaN for one run."""
-        per_run = self.run_rmse_m
-        return float(per_run.std(ddof=1) / np.sqrt(len(per_run))) if len(per_run) > 1 else math.nan
+        return standard_error(self.run_rmse_m)
 
     @property
     def nees(self) -> Floats:
@@ -338,18 +319,13 @@ def simulate(
         columns = core.simulate(sonar, world, scenario.seed, first, count)
         return {name: values for name, values in columns.items() if name not in true}
 
-    try:
-        columns = montecarlo.run(
-            part,
-            scenario.runs,
-            chunk=max(1, min(5, 500_000 // scenario.pings)),
-            workers=workers,
-            progress=progress,
-            store=store,
-            settings=settings,
-        )
-    except montecarlo.Interrupted as stop:
-        if stop.partial is not None:
-            stop.partial = SlatResult(**true, **stop.partial, scenario=scenario)
-        raise
-    return SlatResult(**true, **columns, scenario=scenario)
+    return collect(
+        partial(SlatResult, **true, scenario=scenario),
+        part,
+        scenario.runs,
+        chunk=max(1, min(5, 500_000 // scenario.pings)),
+        workers=workers,
+        progress=progress,
+        store=store,
+        settings=settings,
+    )

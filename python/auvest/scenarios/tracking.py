@@ -7,29 +7,32 @@ when the next sample is taken, and the desired track is the true one, as in the 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass
+from functools import partial
 from math import inf
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from auvest import _core, metrics, montecarlo
-from auvest._arguments import (
-    as_flag,
-    as_instance,
-    as_integer,
-    as_kind,
-    as_number,
-    as_pair,
+from auvest._arguments import as_instance, as_number
+from auvest._fields import (
+    Checked,
+    choice,
+    flag,
+    fraction,
+    instance,
+    integer,
+    not_negative,
+    number,
+    pair,
+    positive,
 )
-from auvest._core import Status
 from auvest.filters import Ekf, Ukf
 from auvest.intervals import FixedInterval
 from auvest.models import ConstantAcceleration, RangeBearing
-
-if TYPE_CHECKING:
-    from auvest._core import _ScenarioDict
+from auvest.scenarios._runs import Runs, collect, only_sensor
 
 _TRACK = _core.track_defaults()
 _NOISE = _core.noise_defaults()
@@ -40,7 +43,7 @@ MAX_SAMPLES = 10_000_000
 
 
 @dataclass(frozen=True, kw_only=True)
-class Track:
+class Track(Checked):
     """The true track, and the desired one.
 
     Parameters
@@ -58,22 +61,13 @@ class Track:
         is steered onto it. 0 m: the desired track is the true one, as in the paper.
     """
 
-    kind: Literal["euler", "straight", "turn"] = "euler"
-    position: tuple[float, float] = as_pair("position", _TRACK["position"])
-    velocity: tuple[float, float] = as_pair("velocity", _TRACK["velocity"])
-    acceleration: tuple[float, float] = as_pair("acceleration", _TRACK["acceleration"])
-    turn_rate: float = _TRACK["turn_rate"]
-    wander_m: float = _TRACK["wander_m"]
-    wander_period_s: float = _TRACK["wander_period_s"]
-
-    def __post_init__(self) -> None:
-        as_kind("kind", self.kind, ("euler", "straight", "turn"))
-        for name in ("position", "velocity", "acceleration"):
-            object.__setattr__(self, name, as_pair(name, getattr(self, name)))
-        object.__setattr__(self, "turn_rate", as_number("turn_rate", self.turn_rate))
-        object.__setattr__(self, "wander_m", as_number("wander_m", self.wander_m, "not negative"))
-        period = as_number("wander_period_s", self.wander_period_s, "positive")
-        object.__setattr__(self, "wander_period_s", period)
+    kind: Literal["euler", "straight", "turn"] = choice("euler", "straight", "turn")
+    position: tuple[float, float] = pair(_TRACK["position"])
+    velocity: tuple[float, float] = pair(_TRACK["velocity"])
+    acceleration: tuple[float, float] = pair(_TRACK["acceleration"])
+    turn_rate: float = number(_TRACK["turn_rate"])
+    wander_m: float = not_negative(_TRACK["wander_m"])
+    wander_period_s: float = positive(_TRACK["wander_period_s"])
 
     @property
     def start(self) -> tuple[float, ...]:
@@ -86,25 +80,14 @@ class Track:
 
     def position_at(self, time_s: float) -> tuple[float, float]:
         """Give the true position (m) after one step of this many seconds."""
-        core = self._as_core()
+        core = _core.Track(*astuple(self))
         core.advance(as_number("time_s", time_s, "not negative"))
         x, y = core.position
         return x, y
 
-    def _as_core(self) -> _core.Track:
-        return _core.Track(
-            self.kind,
-            self.position,
-            self.velocity,
-            self.acceleration,
-            self.turn_rate,
-            self.wander_m,
-            self.wander_period_s,
-        )
-
 
 @dataclass(frozen=True, kw_only=True)
-class Noise:
+class Noise(Checked):
     """The paper's three sensor noises, (0, 1) each, times a scale per sensor.
 
     Uniform noise lies in 0..1 and lognormal noise is ``exp(normal)``: their means are 0.5 and 1.65,
@@ -123,19 +106,11 @@ class Noise:
         Probability, in 0..1, that a measurement is missing.
     """
 
-    kind: Literal["normal", "uniform", "lognormal"] = "normal"
-    range_m: float = _NOISE["range_m"]
-    bearing_rad: float = _NOISE["bearing_rad"]
-    centred: bool = _NOISE["centred"]
-    dropout: float = _NOISE["dropout"]
-
-    def __post_init__(self) -> None:
-        as_kind("kind", self.kind, ("normal", "uniform", "lognormal"))
-        as_flag("centred", self.centred)
-        for name in ("range_m", "bearing_rad", "dropout"):
-            object.__setattr__(self, name, as_number(name, getattr(self, name), "not negative"))
-        if self.dropout > 1:
-            raise ValueError(f"dropout must lie in 0..1, not {self.dropout}")
+    kind: Literal["normal", "uniform", "lognormal"] = choice("normal", "uniform", "lognormal")
+    range_m: float = not_negative(_NOISE["range_m"])
+    bearing_rad: float = not_negative(_NOISE["bearing_rad"])
+    centred: bool = flag(_NOISE["centred"])
+    dropout: float = fraction(_NOISE["dropout"])
 
     @property
     def mean(self) -> tuple[float, float]:
@@ -151,7 +126,7 @@ class Noise:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Scenario:
+class Scenario(Checked):
     """What is simulated.
 
     Parameters
@@ -177,44 +152,34 @@ class Scenario:
         Position error that probes are compared with, m.
     """
 
-    track: Track = field(default_factory=Track)
-    noise: Noise = field(default_factory=Noise)
-    steps: int = 60
-    duration_s: float = inf
-    runs: int = 200
-    seed: int = 1
-    random_start: bool = False
-    interval_s: float = _INTERVAL["interval_s"]
-    probe_period_s: float = 0.0
-    budget_m: float = 0.1
+    track: Track = instance(Track)
+    noise: Noise = instance(Noise)
+    steps: int = integer(60, 1, MAX_SAMPLES)
+    duration_s: float = positive(inf, infinite=True)
+    runs: int = integer(200, 1, MAX_SAMPLES)
+    seed: int = integer(1, 0, 2**64 - 1)
+    random_start: bool = flag(False)
+    interval_s: float = positive(_INTERVAL["interval_s"])
+    probe_period_s: float = not_negative(0.0)
+    budget_m: float = positive(0.1)
 
     def __post_init__(self) -> None:
-        as_instance("track", self.track, Track)
-        as_instance("noise", self.noise, Noise)
-        as_flag("random_start", self.random_start)
-        set_field = object.__setattr__
-        set_field(self, "steps", as_integer("steps", self.steps, 1, MAX_SAMPLES))
-        set_field(self, "runs", as_integer("runs", self.runs, 1, MAX_SAMPLES))
-        set_field(self, "seed", as_integer("seed", self.seed, 0, 2**64 - 1))
+        super().__post_init__()
         if self.runs * self.steps > MAX_SAMPLES:
             raise ValueError(
                 f"runs * steps must be at most {MAX_SAMPLES}, not {self.runs} * {self.steps}"
             )
-        duration = as_number("duration_s", self.duration_s, "positive", infinite=True)
-        set_field(self, "duration_s", duration)
-        set_field(self, "interval_s", as_number("interval_s", self.interval_s, "positive"))
-        period = as_number("probe_period_s", self.probe_period_s, "not negative")
-        if 0 < period < 1e-4:
-            raise ValueError(f"probe_period_s must be 0 or at least 1e-4, not {period}")
-        set_field(self, "probe_period_s", period)
-        set_field(self, "budget_m", as_number("budget_m", self.budget_m, "positive"))
+        if 0 < self.probe_period_s < 1e-4:
+            raise ValueError(
+                f"probe_period_s must be 0 or at least 1e-4, not {self.probe_period_s}"
+            )
 
 
 _SCENARIO = Scenario()
 
 
 @dataclass(frozen=True)
-class TrackingResult:
+class TrackingResult(Runs):
     """What :func:`simulate` returns. Rows after the end of a run are NaN.
 
     Attributes
@@ -264,20 +229,9 @@ class TrackingResult:
     scenario: Scenario
 
     @property
-    def failed(self) -> npt.NDArray[np.bool_]:
-        """Runs whose status is not ok, shape (runs,)."""
-        failed: npt.NDArray[np.bool_] = self.status != int(Status.ok)
-        return failed
-
-    @property
-    def error(self) -> npt.NDArray[np.float64]:
+    def error(self) -> npt.NDArray[np.float64]:  # type: ignore[override]
         """Position errors at the samples, m, shape (runs, steps, 2)."""
         return self.x[..., :2] - self.truth
-
-    @property
-    def rmse_m(self) -> float:
-        """Root mean square position error over all samples of all runs, m."""
-        return metrics.rmse(self.error)
 
     @property
     def nees(self) -> npt.NDArray[np.float64]:
@@ -348,19 +302,14 @@ def simulate(
     def part(first: int, count: int) -> dict[str, npt.NDArray[Any]]:
         return _core.simulate_tracking(core, x0, p0, sensor, _as_core(scenario, first, count))
 
-    try:
-        columns = montecarlo.run(
-            part,
-            runs=scenario.runs,
-            chunk=montecarlo.chunk_for(scenario.runs, scenario.steps, workers),
-            workers=workers,
-            progress=progress,
-        )
-    except montecarlo.Interrupted as stop:
-        if stop.partial is not None:
-            stop.partial = TrackingResult(**stop.partial, scenario=scenario)
-        raise
-    return TrackingResult(**columns, scenario=scenario)
+    return collect(
+        partial(TrackingResult, scenario=scenario),
+        part,
+        scenario.runs,
+        chunk=montecarlo.chunk_for(scenario.runs, scenario.steps, workers),
+        workers=workers,
+        progress=progress,
+    )
 
 
 def sensor_of(filter: Ekf | Ukf) -> RangeBearing:  # noqa: A002 (its name in this package)
@@ -371,27 +320,14 @@ def sensor_of(filter: Ekf | Ukf) -> RangeBearing:  # noqa: A002 (its name in thi
     ValueError
         If it has another process or other sensors.
     """
-    sensors = list(filter.sensors.values())
     if not isinstance(filter.process, ConstantAcceleration):
         raise ValueError(f"filter must have a ConstantAcceleration, not {filter.process}")
-    if len(sensors) != 1 or not isinstance(sensors[0], RangeBearing):
-        raise ValueError(f"filter must have one RangeBearing as its sensor, not {sensors}")
-    return sensors[0]
+    return only_sensor(filter, RangeBearing)
 
 
-def _as_core(scenario: Scenario, first: int, count: int) -> _ScenarioDict:
-    track, noise = scenario.track, scenario.noise
-    return {
-        "track": track._as_core(),
-        "noise": _core.SensorNoise(
-            noise.kind, noise.range_m, noise.bearing_rad, noise.centred, noise.dropout
-        ),
-        "seed": scenario.seed,
-        "first_run": first,
-        "runs": count,
-        "steps": scenario.steps,
-        "duration_s": scenario.duration_s,
-        "random_start": scenario.random_start,
-        "probe_period_s": scenario.probe_period_s,
-        "budget_m": scenario.budget_m,
-    }
+def _as_core(scenario: Scenario, first: int, count: int) -> dict[str, Any]:
+    values = {**vars(scenario), "first_run": first, "runs": count}
+    values.pop("interval_s")  # is the filter's
+    values["track"] = _core.Track(*astuple(scenario.track))
+    values["noise"] = _core.SensorNoise(*astuple(scenario.noise))
+    return values

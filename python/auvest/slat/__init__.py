@@ -4,12 +4,18 @@ A slave vehicle that can only dead-reckon pings masters with its own sonar (Lu, 
 2020).
 """
 
-from auvest.slat._base import MAX_MASTERS, UNKNOWN_MASTER, ParticleSlatFilter, SlatFilter
+from auvest.slat._base import (
+    MAX_MASTERS,
+    UNKNOWN_MASTER,
+    ParticleSlatFilter,
+    Resampling,
+    SlatFilter,
+)
 from auvest.slat.dead_reckoning import DeadReckoning
 from auvest.slat.ekf_slat import MAX_IMM_MASTERS, EkfSlat
 from auvest.slat.outage import Outage
 from auvest.slat.results import SlatRun
-from auvest.slat.slatf import MAX_PARTICLES, Lanes, Resampling, Slatf, available_lanes
+from auvest.slat.slatf import MAX_PARTICLES, Lanes, Slatf, available_lanes
 from auvest.slat.slatf_joint import SlatfJoint
 
 __all__ = [

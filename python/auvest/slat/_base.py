@@ -7,7 +7,7 @@ where they are plain; what it does not take is converted here, or refused with w
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, Literal, TypeVar, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +22,7 @@ from auvest._arguments import (
     as_flag,
     as_instance,
     as_integer,
+    as_kind,
     as_number,
     as_step,
     require_range,
@@ -30,6 +31,7 @@ from auvest._core import Status
 from auvest.errors import FilterError
 from auvest.slat.models import (
     CompassMotion,
+    Master,
     Motion,
     PiecewiseAcceleration,
     Sonar,
@@ -50,6 +52,8 @@ _LARGEST_Z = 1e9
 COMPASS = CompassMotion()
 MASTER = PiecewiseAcceleration()
 SONAR = Sonar()
+
+Resampling = Literal["systematic", "stratified", "residual", "multinomial"]
 
 _Self = TypeVar("_Self", bound="Steps")
 
@@ -72,15 +76,13 @@ class Steps:
     def x(self) -> Floats:
         """The slave's estimated pose (m, rad), shape (n,), a copy."""
         with self._exclusive:
-            x: Floats = self._slave()[0]
-        return x
+            return self._slave()[0]
 
     @property
     def P(self) -> Floats:
         """Its covariance, shape (n, n), a copy."""
         with self._exclusive:
-            p: Floats = self._slave()[1]
-        return p
+            return self._slave()[1]
 
     def master(self, n: int) -> tuple[Floats, Floats]:
         """Give mean (6,) and covariance (6, 6) of master n, ``[x, y, vx, vy, ax, ay]``.
@@ -91,8 +93,7 @@ class Steps:
             If there is no such master.
         """
         with self._exclusive:
-            x, p = self._core_steps.master(self._as_master(n))
-        return x, p
+            return self._core_steps.master(self._as_master(n))
 
     @property
     def status(self) -> Status:
@@ -330,8 +331,7 @@ class Steps:
         raise NotImplementedError
 
     def _slave(self) -> tuple[Floats, Floats]:
-        x, p = self._core_steps.slave()
-        return x, p
+        return self._core_steps.slave()
 
     def _do(
         self, name: str, plain: tuple[Any, ...], convert: Callable[[], tuple[Any, ...]], *rest: Any
@@ -418,24 +418,30 @@ class SlatFilter(Steps):
     _defaults: ClassVar[Mapping[str, Any]] = {}
 
     _max_masters: int = MAX_MASTERS
-    _settings: dict[str, Any]  # what the constructor was given beside x0, P0, dtype and seed
+    _settings: dict[str, Any]  # beside motion, sonar and dtype: all that makes the filter
 
     def __init__(
         self,
         x0: npt.ArrayLike,
         P0: npt.ArrayLike,
         *,
-        motion: Motion,
-        sonar: Sonar,
-        dtype: npt.DTypeLike,
+        motion: Motion = COMPASS,
+        sonar: Sonar = SONAR,
+        dtype: npt.DTypeLike = "float64",
         seed: int = 0,
-        **settings: Any,
+        settings: Mapping[str, Any] | None = None,
+        **parameters: Any,
     ) -> None:
+        for name in parameters:
+            if name not in self._defaults:
+                raise TypeError(
+                    f"{type(self).__name__}.__init__() got an unexpected keyword argument {name!r}"
+                )
         self._dtype = as_dtype(dtype)
         self._motion = as_instance("motion", motion, (CompassMotion, UnicycleMotion))
         self._sonar = as_instance("sonar", sonar, Sonar)
         require_heading(self._sonar, self._motion)
-        self._settings = {**settings, **self._as_params(settings)}
+        self._settings = {**(settings or {}), **self._as_params(parameters)}
         seed = as_integer("seed", seed, 0, 2**64 - 1)
         n = self._motion.pose_states
         state = as_array("x0", x0, (n,), self._dtype)
@@ -561,11 +567,11 @@ class SlatFilter(Steps):
     def _as_params(self, given: Mapping[str, Any]) -> dict[str, Any]:
         """Take values for ``_defaults``: flags, shares in 0..1, else numbers of at least 0."""
         params: dict[str, Any] = {}
-        for name, default in self._defaults.items():
-            if isinstance(default, bool):
-                params[name] = as_flag(name, given[name])
+        for name, value in {**self._defaults, **given}.items():
+            if isinstance(self._defaults[name], bool):
+                params[name] = as_flag(name, value)
                 continue
-            params[name] = as_number(name, given[name], "not negative")
+            params[name] = as_number(name, value, "not negative")
             if name in ("resample_below", "kept") and params[name] > 1:
                 raise ValueError(f"{name} must lie in 0..1, not {params[name]:g}")
         return params
@@ -573,6 +579,28 @@ class SlatFilter(Steps):
 
 class ParticleSlatFilter(SlatFilter):
     """What :class:`Slatf` and :class:`SlatfJoint` share; not for direct use."""
+
+    _max_particles: ClassVar[int]
+    _masters: ClassVar[tuple[type, ...]] = (PiecewiseAcceleration,)
+
+    def __init__(
+        self,
+        x0: npt.ArrayLike,
+        P0: npt.ArrayLike,
+        *,
+        particles: int = 100,
+        master: Master = MASTER,
+        resampling: Resampling = "systematic",
+        seed: int = 1,
+        settings: Mapping[str, Any],
+        **options: Any,
+    ) -> None:
+        own = {
+            "particles": as_integer("particles", particles, 1, self._max_particles),
+            "master": as_instance("master", master, self._masters),
+            "resampling": as_kind("resampling", resampling, get_args(Resampling)),
+        }
+        super().__init__(x0, P0, seed=seed, settings={**own, **settings}, **options)
 
     @property
     def particles(self) -> int:
@@ -593,15 +621,13 @@ class ParticleSlatFilter(SlatFilter):
     def weights(self) -> Floats:
         """Normalised weights of the particles, shape (N,), a copy."""
         with self._exclusive:
-            weights: Floats = self._core_steps.particles()[0]
-        return weights
+            return self._core_steps.particles()[0]
 
     @property
     def poses(self) -> Floats:
         """Poses of the particles (:class:`SlatfJoint`: their means), shape (N, n), a copy."""
         with self._exclusive:
-            poses: Floats = self._core_steps.particles()[1]
-        return poses
+            return self._core_steps.particles()[1]
 
 
 def as_covariance(name: str, value: object, n: int, dtype: DType, *, definite: bool) -> Floats:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy.typing as npt
 
-from auvest.slat._base import COMPASS, SONAR, SlatFilter
+from auvest.slat._base import COMPASS, SlatFilter
 from auvest.slat.models import Motion
 
 
@@ -34,7 +34,7 @@ class DeadReckoning(SlatFilter):
         motion: Motion = COMPASS,
         dtype: npt.DTypeLike = "float64",
     ) -> None:
-        super().__init__(x0, P0, motion=motion, sonar=SONAR, dtype=dtype)
+        super().__init__(x0, P0, motion=motion, dtype=dtype)
 
     def _build(self, core: Any, motion: dict[str, Any], params: dict[str, Any]) -> Any:
         del params

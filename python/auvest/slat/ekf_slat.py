@@ -48,7 +48,10 @@ class EkfSlat(SlatFilter):
     ) -> None:
         as_instance("master", master, (PiecewiseAcceleration, Imm))
         self._max_masters = MAX_IMM_MASTERS if isinstance(master, Imm) else MAX_MASTERS
-        super().__init__(x0, P0, motion=motion, sonar=sonar, dtype=dtype, master=master, gate=gate)
+        settings = {"master": master}
+        super().__init__(
+            x0, P0, motion=motion, sonar=sonar, dtype=dtype, settings=settings, gate=gate
+        )
 
     def _build(self, core: Any, motion: dict[str, Any], params: dict[str, Any]) -> Any:
         return core.ekf_slat(

@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from functools import lru_cache
 from typing import Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
 
 from auvest import _core
-from auvest._arguments import (
-    as_array,
-    as_flag,
-    as_instance,
-    as_kind,
-    as_number,
-    require_range,
-)
+from auvest._arguments import as_array, require_range
+from auvest._fields import Checked, choice, flag, instance, not_negative, positive
 from auvest.models import ConstantAcceleration
 
 _COMPASS = _core.compass_motion_defaults()
@@ -26,14 +20,8 @@ _IMM = _core.imm_defaults()
 _SONAR = _core.sonar_defaults()
 
 
-def _check_numbers(model: object, *names: str) -> None:
-    for name in names:
-        value = as_number(name, getattr(model, name), "not negative")
-        object.__setattr__(model, name, value)
-
-
 @dataclass(frozen=True, kw_only=True)
-class CompassMotion:
+class CompassMotion(Checked):
     """Dead reckoning from measured speed (m/s) and heading (rad), Eq. (2) of the SLATF paper.
 
     The pose is ``[x, y]`` (m), the reading ``u = [speed, heading]``; measured = true + noise.
@@ -52,22 +40,21 @@ class CompassMotion:
         If an argument lies outside its range.
     """
 
-    sigma_speed_m_s: float = _COMPASS["sigma_speed_m_s"]
-    sigma_heading_rad: float = _COMPASS["sigma_heading_rad"]
-    compensate_bias: bool = _COMPASS["compensate_bias"]
+    sigma_speed_m_s: float = not_negative(_COMPASS["sigma_speed_m_s"])
+    sigma_heading_rad: float = not_negative(_COMPASS["sigma_heading_rad"])
+    compensate_bias: bool = flag(_COMPASS["compensate_bias"])
 
     name: ClassVar[str] = "compass"
     pose_states: ClassVar[int] = 2
 
     def __post_init__(self) -> None:
-        _check_numbers(self, "sigma_speed_m_s", "sigma_heading_rad")
+        super().__post_init__()
         if self.sigma_heading_rad > 3:
             raise ValueError(f"sigma_heading_rad must be at most 3, not {self.sigma_heading_rad}")
-        as_flag("compensate_bias", self.compensate_bias)
 
 
 @dataclass(frozen=True, kw_only=True)
-class UnicycleMotion:
+class UnicycleMotion(Checked):
     """Dead reckoning from measured speed (m/s) and yaw rate (rad/s).
 
     The pose is ``[x, y, heading]`` (m, rad), the reading ``u = [speed, yaw rate]``.
@@ -83,21 +70,18 @@ class UnicycleMotion:
         If an argument lies outside its range.
     """
 
-    sigma_speed_m_s: float = _UNICYCLE["sigma_speed_m_s"]
-    sigma_yaw_rate_rad_s: float = _UNICYCLE["sigma_yaw_rate_rad_s"]
+    sigma_speed_m_s: float = not_negative(_UNICYCLE["sigma_speed_m_s"])
+    sigma_yaw_rate_rad_s: float = not_negative(_UNICYCLE["sigma_yaw_rate_rad_s"])
 
     name: ClassVar[str] = "unicycle"
     pose_states: ClassVar[int] = 3
-
-    def __post_init__(self) -> None:
-        _check_numbers(self, "sigma_speed_m_s", "sigma_yaw_rate_rad_s")
 
 
 Motion: TypeAlias = CompassMotion | UnicycleMotion
 
 
 @dataclass(frozen=True, kw_only=True)
-class PiecewiseAcceleration:
+class PiecewiseAcceleration(Checked):
     """A master with state ``[x, y, vx, vy, ax, ay]`` whose acceleration jumps at random, Eq. (4).
 
     Parameters
@@ -111,14 +95,11 @@ class PiecewiseAcceleration:
         If the argument lies outside its range.
     """
 
-    acceleration_m_s2: float = _MASTER["acceleration_m_s2"]
-
-    def __post_init__(self) -> None:
-        _check_numbers(self, "acceleration_m_s2")
+    acceleration_m_s2: float = not_negative(_MASTER["acceleration_m_s2"])
 
 
 @dataclass(frozen=True, kw_only=True)
-class ConstantVelocity:
+class ConstantVelocity(Checked):
     """A master that goes straight, state ``[x, y, vx, vy, ax, ay]``; one model of an :class:`Imm`.
 
     Parameters
@@ -134,15 +115,12 @@ class ConstantVelocity:
         If an argument lies outside its range.
     """
 
-    velocity_psd: float = _IMM["straight"]["velocity_psd"]
-    sigma_acceleration_m_s2: float = _IMM["straight"]["sigma_acceleration_m_s2"]
-
-    def __post_init__(self) -> None:
-        _check_numbers(self, "velocity_psd", "sigma_acceleration_m_s2")
+    velocity_psd: float = not_negative(_IMM["straight"]["velocity_psd"])
+    sigma_acceleration_m_s2: float = not_negative(_IMM["straight"]["sigma_acceleration_m_s2"])
 
 
 @dataclass(frozen=True, kw_only=True)
-class CoordinatedTurn:
+class CoordinatedTurn(Checked):
     """A master that turns at the rate ``(v x a) / |v|^2`` of its state; a model of an :class:`Imm`.
 
     Parameters
@@ -159,18 +137,14 @@ class CoordinatedTurn:
         If an argument lies outside its range.
     """
 
-    position_psd: float = _IMM["turning"]["position_psd"]
-    velocity_psd: float = _IMM["turning"]["velocity_psd"]
-    acceleration_psd: float = _IMM["turning"]["acceleration_psd"]
-    slow_m_s: float = _IMM["turning"]["slow_m_s"]
-
-    def __post_init__(self) -> None:
-        _check_numbers(self, "position_psd", "velocity_psd", "acceleration_psd")
-        object.__setattr__(self, "slow_m_s", as_number("slow_m_s", self.slow_m_s, "positive"))
+    position_psd: float = not_negative(_IMM["turning"]["position_psd"])
+    velocity_psd: float = not_negative(_IMM["turning"]["velocity_psd"])
+    acceleration_psd: float = not_negative(_IMM["turning"]["acceleration_psd"])
+    slow_m_s: float = positive(_IMM["turning"]["slow_m_s"])
 
 
 @dataclass(frozen=True, kw_only=True)
-class Imm:
+class Imm(Checked):
     """Interacting multiple models: a master whose manoeuvres nobody announces.
 
     It goes straight, accelerates or turns. A motion is drawn anew ``switch_rate_hz`` times per
@@ -194,16 +168,14 @@ class Imm:
         If an argument lies outside its range.
     """
 
-    straight: ConstantVelocity = field(default_factory=ConstantVelocity)
-    accelerated: ConstantAcceleration = field(default_factory=ConstantAcceleration)
-    turning: CoordinatedTurn = field(default_factory=CoordinatedTurn)
+    straight: ConstantVelocity = instance(ConstantVelocity)
+    accelerated: ConstantAcceleration = instance(ConstantAcceleration)
+    turning: CoordinatedTurn = instance(CoordinatedTurn)
     share: tuple[float, float, float] = (1 / 3, 1 / 3, 1 / 3)
-    switch_rate_hz: float = _IMM["switch_rate_hz"]
+    switch_rate_hz: float = not_negative(_IMM["switch_rate_hz"])
 
     def __post_init__(self) -> None:
-        as_instance("straight", self.straight, ConstantVelocity)
-        as_instance("accelerated", self.accelerated, ConstantAcceleration)
-        as_instance("turning", self.turning, CoordinatedTurn)
+        super().__post_init__()
         if self.accelerated.discretisation != "exact":
             raise ValueError("accelerated must have the discretisation 'exact'")
         share = as_array("share", self.share, (3,), np.dtype(np.float64))
@@ -212,14 +184,13 @@ class Imm:
                 f"share must be three numbers of at least 0 with sum 1, not {self.share}"
             )
         object.__setattr__(self, "share", tuple(float(part) for part in share))
-        _check_numbers(self, "switch_rate_hz")
 
 
 Master: TypeAlias = PiecewiseAcceleration | Imm
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sonar:
+class Sonar(Checked):
     """Range (m) and bearing (rad) between slave and master, Eqs. (5) and (6).
 
     Parameters
@@ -237,17 +208,18 @@ class Sonar:
         If an argument lies outside its range.
     """
 
-    sigma_range_m: float = _SONAR["sigma_range_m"]
-    sigma_bearing_rad: float = _SONAR["sigma_bearing_rad"]
-    bearing: Literal["master_to_slave", "slave_to_master", "from_heading"] = "master_to_slave"
+    sigma_range_m: float = positive(_SONAR["sigma_range_m"])
+    sigma_bearing_rad: float = positive(_SONAR["sigma_bearing_rad"])
+    bearing: Literal["master_to_slave", "slave_to_master", "from_heading"] = choice(
+        "master_to_slave", "slave_to_master", "from_heading"
+    )
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         for name in ("sigma_range_m", "sigma_bearing_rad"):
-            value = as_number(name, getattr(self, name), "positive")
+            value = getattr(self, name)
             if value <= 1e-6:
                 raise ValueError(f"{name} must be above 1e-6, not {value}")
-            object.__setattr__(self, name, value)
-        as_kind("bearing", self.bearing, ("master_to_slave", "slave_to_master", "from_heading"))
 
 
 def core_master(master: Master, dtype: str) -> dict[str, Any]:
@@ -278,5 +250,4 @@ def core_sonar(model: Sonar, dtype: str) -> _core._Sonar:
     params = asdict(model)
     bearing = params.pop("bearing")
     require_range(params, dtype, squared=tuple(params))
-    sonar: _core._Sonar = getattr(_core, f"Sonar_{dtype}")(params, bearing)
-    return sonar
+    return getattr(_core, f"Sonar_{dtype}")(params, bearing)

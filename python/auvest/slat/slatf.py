@@ -9,17 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from auvest import _core
-from auvest._arguments import DType, as_dtype, as_instance, as_integer, as_kind, as_number
-from auvest.slat._base import COMPASS, MASTER, SONAR, ParticleSlatFilter
-from auvest.slat.models import Imm, Master, Motion, PiecewiseAcceleration, Sonar, core_master
+from auvest._arguments import DType, as_dtype, as_integer, as_kind, as_number
+from auvest.slat._base import MASTER, ParticleSlatFilter
+from auvest.slat.models import Imm, Master, PiecewiseAcceleration, core_master
 
 #: Particles that a filter takes at most: 0.5 kB each in float32.
 MAX_PARTICLES = 10_000_000
 
 Lanes = Literal["scalar", "sse2", "avx2", "avx512"]
-Resampling = Literal["systematic", "stratified", "residual", "multinomial"]
-
-_DEFAULTS = _core.slatf_defaults()
 
 
 def available_lanes(dtype: npt.DTypeLike = "float32") -> tuple[str, ...]:
@@ -70,7 +67,9 @@ class Slatf(ParticleSlatFilter):
         If an argument is wrong; the message names it.
     """
 
-    _defaults = _DEFAULTS
+    _defaults = _core.slatf_defaults()
+    _max_particles = MAX_PARTICLES
+    _masters = (PiecewiseAcceleration, Imm)
 
     def __init__(
         self,
@@ -78,44 +77,17 @@ class Slatf(ParticleSlatFilter):
         P0: npt.ArrayLike,
         *,
         version: Literal[1, 2] = 2,
-        particles: int = 100,
-        motion: Motion = COMPASS,
         master: Master = MASTER,
-        sonar: Sonar = SONAR,
-        resampling: Resampling = "systematic",
-        resample_below: float = _DEFAULTS["resample_below"],
-        carry_covariance: bool = _DEFAULTS["carry_covariance"],
-        gate: float = _DEFAULTS["gate"],
-        birth_velocity_m_s: float = _DEFAULTS["birth_velocity_m_s"],
-        birth_acceleration_m_s2: float = _DEFAULTS["birth_acceleration_m_s2"],
         lanes: Lanes | None = None,
         dtype: npt.DTypeLike = "float64",
-        seed: int = 1,
+        **options: Any,
     ) -> None:
-        particles = as_integer("particles", particles, 1, MAX_PARTICLES)
-        as_instance("master", master, (PiecewiseAcceleration, Imm))
-        as_kind("resampling", resampling, get_args(Resampling))
         if isinstance(master, Imm):
             as_kind("lanes", lanes or "scalar", ("scalar",))  # with an Imm particles run one by one
             lanes = "scalar"
         self._lanes = _as_lanes(lanes, as_dtype(dtype))
-        super().__init__(
-            x0,
-            P0,
-            motion=motion,
-            sonar=sonar,
-            dtype=dtype,
-            seed=seed,
-            version=as_integer("version", version, 1, 2),
-            particles=particles,
-            master=master,
-            resampling=resampling,
-            resample_below=resample_below,
-            carry_covariance=carry_covariance,
-            gate=gate,
-            birth_velocity_m_s=birth_velocity_m_s,
-            birth_acceleration_m_s2=birth_acceleration_m_s2,
-        )
+        settings = {"version": as_integer("version", version, 1, 2)}
+        super().__init__(x0, P0, master=master, dtype=dtype, settings=settings, **options)
 
     def _as_params(self, given: Mapping[str, Any]) -> dict[str, Any]:
         params = super()._as_params(given)

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, get_args
+from typing import Any
 
 import numpy.typing as npt
 
 from auvest import _core
-from auvest._arguments import as_instance, as_integer, as_kind
-from auvest.slat._base import COMPASS, MASTER, MAX_MASTERS, SONAR, ParticleSlatFilter
-from auvest.slat.models import Motion, PiecewiseAcceleration, Sonar, core_params
-from auvest.slat.slatf import Resampling
-
-_DEFAULTS = _core.slatf_joint_defaults()
+from auvest._arguments import as_integer
+from auvest.slat._base import MAX_MASTERS, ParticleSlatFilter
+from auvest.slat.models import core_params
 
 
 class SlatfJoint(ParticleSlatFilter):
@@ -41,44 +38,19 @@ class SlatfJoint(ParticleSlatFilter):
         If an argument is wrong; the message names it.
     """
 
-    _defaults = _DEFAULTS
+    _defaults = _core.slatf_joint_defaults()
+    _max_particles = 1_000_000
 
     def __init__(
         self,
         x0: npt.ArrayLike,
         P0: npt.ArrayLike,
         *,
-        particles: int = 100,
-        motion: Motion = COMPASS,
-        master: PiecewiseAcceleration = MASTER,
-        sonar: Sonar = SONAR,
-        resampling: Resampling = "systematic",
-        resample_below: float = _DEFAULTS["resample_below"],
-        kept: float = _DEFAULTS["kept"],
-        gate: float = _DEFAULTS["gate"],
         max_masters: int = 1,
-        dtype: npt.DTypeLike = "float64",
-        seed: int = 1,
+        **options: Any,
     ) -> None:
-        particles = as_integer("particles", particles, 1, 1_000_000)
         self._max_masters = as_integer("max_masters", max_masters, 1, MAX_MASTERS)
-        as_instance("master", master, PiecewiseAcceleration)
-        as_kind("resampling", resampling, get_args(Resampling))
-        super().__init__(
-            x0,
-            P0,
-            motion=motion,
-            sonar=sonar,
-            dtype=dtype,
-            seed=seed,
-            particles=particles,
-            master=master,
-            resampling=resampling,
-            max_masters=self._max_masters,
-            resample_below=resample_below,
-            kept=kept,
-            gate=gate,
-        )
+        super().__init__(x0, P0, settings={"max_masters": self._max_masters}, **options)
 
     def _build(self, core: Any, motion: dict[str, Any], params: dict[str, Any]) -> Any:
         settings = self._settings

@@ -27,7 +27,10 @@ struct LateEvent {
   Measurement z;  ///< of an update, as the sensor
   Sensor sensor;
 
-  LateEvent() : is_update(false), dt(Scalar(0)) {}
+  LateEvent() : is_update(false), dt(Scalar(0)) {
+    math::set_zero(input);
+    math::set_zero(z);
+  }
   LateEvent(Scalar step, const Input& u) : is_update(false), dt(step), input(u) {
     math::set_zero(z);
   }

@@ -222,6 +222,26 @@ struct RangeBearingElevation
     return difference;
   }
 
+  /// As RangeBearing's: the bend of the range, where it is more than three sigma of it. Its
+  /// variance is that of a belief which is wide in one direction across the line of sight; it is
+  /// less in two.
+  AUVEST_INLINE void second_order(const Expansion& point, const Matrix<Scalar, 3, 3>& root,
+                                  Measurement& innovation, Noise& noise) const {
+    const Scalar* const d = point.offset;
+    Scalar across = Scalar(0);  // |L x D|^2
+    for (int k = 0; k < 3; ++k) {
+      const Scalar x = d[1] * root(2, k) - d[2] * root(1, k);
+      const Scalar y = d[2] * root(0, k) - d[0] * root(2, k);
+      const Scalar z = d[0] * root(1, k) - d[1] * root(0, k);
+      across = across + (x * x + y * y + z * z);
+    }
+    const Scalar twice = across * point.inverse_square / point.range;
+    const Scalar bend = Scalar(0.5) * twice;
+    if (!(twice * bend > Scalar(9) * noise(0, 0))) return;
+    innovation(0) = innovation(0) - bend;
+    noise(0, 0) = noise(0, 0) + twice * bend;
+  }
+
   AUVEST_INLINE bool near_field(const Expansion& point, const Matrix<Scalar, N, N>& P,
                                 const Measurement& z, Measurement& innovation, Noise& noise) const {
     const Scalar factor = params.near_field * params.near_field;

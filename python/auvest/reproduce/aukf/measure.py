@@ -7,6 +7,7 @@ are the numbers of the figures. The page that judges the paper's claims is made 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -17,6 +18,7 @@ from auvest import Aukf, FixedInterval, MahalanobisInterval
 from auvest.intervals import IntervalPolicy
 from auvest.reproduce.estimate import Estimate, Floats
 from auvest.reproduce.ticks import Ticks
+from auvest.scenarios._runs import standard_error
 from auvest.scenarios.paper_aukf import (
     ASSUMPTIONS,
     FIXED_INTERVAL_S,
@@ -263,10 +265,7 @@ def collapsed(pace: Floats) -> float:
 def rms(square: Floats) -> Estimate:
     """Root of a mean of squares, and its standard error, from one mean square per run."""
     value = float(np.sqrt(square.mean()))
-    if len(square) < 2 or value == 0:
-        return Estimate(value, float("nan"))
-    spread = float(square.std(ddof=1) / np.sqrt(len(square)))
-    return Estimate(value, spread / (2 * value))
+    return Estimate(value, standard_error(square) / (2 * value) if value else math.nan)
 
 
 def square_per_run(result: TrackingResult, axis: int | None = None) -> Floats:
@@ -302,10 +301,7 @@ def excess_over_time(a: TrackingResult, b: TrackingResult) -> Estimate:
 
 def _excess(square_a: Floats, square_b: Floats) -> Estimate:
     ratio = float(np.sqrt(square_a.mean() / square_b.mean()))
-    if len(square_a) < 2:
-        return Estimate(ratio - 1, float("nan"))
-    residual = square_a - ratio**2 * square_b
-    spread = float(residual.std(ddof=1) / np.sqrt(len(residual)) / square_b.mean())
+    spread = standard_error(square_a - ratio**2 * square_b) / float(square_b.mean())
     return Estimate(ratio - 1, spread / (2 * ratio))
 
 
@@ -385,8 +381,7 @@ def summary(result: Reproduction) -> dict[str, Any]:
         "errors_bias_removed": {kind: _errors(case) for kind, case in result.centred.items()},
         "tau0": {
             f"{tau0:g}": {
-                "rmse_m": rmse(run).value,
-                "rmse_standard_error_m": rmse(run).standard_error,
+                **_both("rmse", rmse(run), "_m"),
                 "interval_s": intervals(run).mean(axis=0),
                 "mean_interval_s": float(intervals(run).mean()),
                 "true_end_m": run.truth[:, -1].mean(axis=0),
@@ -417,26 +412,17 @@ def summary(result: Reproduction) -> dict[str, Any]:
     }
 
 
-def _rmse(name: str, estimate: Estimate) -> dict[str, float]:
-    return {
-        f"{name}_rmse_m": estimate.value,
-        f"{name}_rmse_standard_error_m": estimate.standard_error,
-    }
-
-
-def _excess_of(estimate: Estimate) -> dict[str, float]:
-    return {
-        "aukf_excess": estimate.value,
-        "aukf_excess_standard_error": estimate.standard_error,
-    }
+def _both(name: str, estimate: Estimate, unit: str = "") -> dict[str, float]:
+    value, error = f"{name}{unit}", f"{name}_standard_error{unit}"
+    return {value: estimate.value, error: estimate.standard_error}
 
 
 def _errors(case: Comparison) -> dict[str, Any]:
-    aukf = _rmse("aukf", rmse(case.aukf))
+    aukf = _both("aukf_rmse", rmse(case.aukf), "_m")
     return {
-        **_rmse("ukf", rmse(case.ukf)),
+        **_both("ukf_rmse", rmse(case.ukf), "_m"),
         **aukf,
-        **_excess_of(excess(case.aukf, case.ukf)),
+        **_both("aukf_excess", excess(case.aukf, case.ukf)),
         "ukf_rmse_x_m": rmse(case.ukf, 0).value,
         "aukf_rmse_x_m": rmse(case.aukf, 0).value,
         "ekf_rmse_m": rmse(case.ekf).value,
@@ -445,18 +431,18 @@ def _errors(case: Comparison) -> dict[str, Any]:
         "mean_interval_s": float(intervals(case.aukf).mean()),
         "runs": len(case.aukf.x),
         "equal_rate": {
-            **_rmse("ukf", rmse(case.equal_rate)),
+            **_both("ukf_rmse", rmse(case.equal_rate), "_m"),
             **aukf,
-            **_excess_of(excess(case.aukf, case.equal_rate)),
+            **_both("aukf_excess", excess(case.aukf, case.equal_rate)),
             "interval_s": float(intervals(case.equal_rate).mean()),
             "over_time": {
                 "ukf_rmse_m": rmse_over_time(case.equal_rate).value,
                 "aukf_rmse_m": rmse_over_time(case.aukf).value,
-                **_excess_of(excess_over_time(case.aukf, case.equal_rate)),
+                **_both("aukf_excess", excess_over_time(case.aukf, case.equal_rate)),
             },
         },
         "same_time": {
-            **_rmse("ukf", rmse(case.same_time)),
+            **_both("ukf_rmse", rmse(case.same_time), "_m"),
             "samples": case.same_time.x.shape[1],
         },
     }

@@ -42,13 +42,11 @@ def plane(result: Reproduction) -> Figure:
                 style = {"color": colour, "label": NAMES[name], "markersize": 4.5}
                 error.plot(rate, [c.policies[name].rmse_m for c in points], mark, **style)
                 above.plot(rate, [100 * c.policies[name].above for c in points], mark, **style)
-            error.set_title(f"{track}; {noise}", fontsize=9.5, loc="left")
-            for panel in (error, above):
+            for panel, title in ((error, f"{track}; {noise}"), (above, "")):
                 panel.set_xscale("log")
                 panel.set_xticks(_RATES, [f"{rate:g}" for rate in _RATES])
                 panel.minorticks_off()
-                panel.set_xlim(0.45, 9.0)
-                plots.style(panel)
+                plots.style(panel, title=title, xlim=(0.45, 9.0))
             above.set_ylim(bottom=0)
             if column == 0:
                 error.set_ylabel("RMSE / m")

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from math import hypot, sqrt
+from math import hypot
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,7 @@ from auvest import (
 )
 from auvest.intervals import IntervalPolicy
 from auvest.reproduce.ticks import Ticks
+from auvest.scenarios._runs import standard_error
 from auvest.scenarios.tracking import Noise, Scenario, Track, TrackingResult, simulate
 
 DEFAULT_RUNS = 200
@@ -281,13 +282,11 @@ def _filter(track: Track, policy: IntervalPolicy) -> Aukf:
 
 
 def _figures(result: TrackingResult) -> Figures:
-    per_run = result.probe_above / result.probe_count
-    spread = float(per_run.std(ddof=1)) / sqrt(len(per_run)) if len(per_run) > 1 else float("nan")
     return Figures(
         interval_s=result.mean_interval_s,
         rmse_m=result.rmse_over_time_m,
         above=result.time_above_budget,
-        above_error=spread,
+        above_error=standard_error(result.probe_above / result.probe_count),
         failed=int(result.failed.sum()),
     )
 

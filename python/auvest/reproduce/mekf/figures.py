@@ -26,10 +26,7 @@ def tracks(result: Reproduction) -> Figure:
         for name, error in over.errors.items():
             place = over.slave[shown] + error[shown]
             panel.plot(*place.T, color=COLOURS[name], label=LABELS[name], linewidth=0.9)
-        panel.set_xlabel("x / m")
-        panel.set_ylabel("y / m")
-        panel.set_aspect("equal", adjustable="datalim")
-        plots.style(panel)
+        plots.style_plane(panel)
     for i, style in enumerate(("--", ":")):
         fleet.plot(*over.leaders[shown, i].T, style, color=plots.GREY, label=f"leader {i + 1}")
     middle = over.slave[min(_SHOWN, len(over.slave)) // 8]
@@ -48,17 +45,12 @@ def error_over_time(result: Reproduction) -> Figure:
     error, gain = figure.subplots(2, 1, sharex=True)
     for name, rms in over.rms_m.items():
         error.plot(over.time_h, rms, color=COLOURS[name], label=LABELS[name])
-    error.set_ylabel("RMS error / m")
-    error.set_ylim(bottom=0)
     gain.plot(over.time_h, 100 * over.improvement, color=COLOURS["igg"])
     gain.axhline(
         30, color=plots.BLACK, linestyle="--", linewidth=0.9, label="the paper: about 30 %"
     )
-    gain.set_ylabel("improvement / %")
-    gain.set_xlabel("time / h")
-    for panel in (error, gain):
-        plots.style(panel)
-        panel.legend(fontsize=8)
+    plots.style(error, legend=8, ylabel="RMS error / m", ylim=(0, None))
+    plots.style(gain, legend=8, ylabel="improvement / %", xlabel="time / h")
     return figure
 
 
@@ -76,9 +68,7 @@ def kernels(result: Reproduction) -> Figure:
         over.errorbar(
             x, y, 1.96 * spread, color=COLOURS[name], label=LABELS[name], marker="o", markersize=4
         )
-    over.set_xlabel("outliers at 10 sigma / %")
-    over.set_ylabel("RMSE / m")
-    over.set_ylim(bottom=0)
+    plots.style(over, xlabel="outliers at 10 sigma / %", ylabel="RMSE / m", ylim=(0, None))
     cases = {**{f"timing {k}": row for k, row in result.timing.items()}, **result.worlds}
     place = np.arange(len(cases))
     for i, name in enumerate(KERNELS):
@@ -86,9 +76,7 @@ def kernels(result: Reproduction) -> Figure:
         bars.barh(place + 0.2 * (i - 1.5), heights, 0.18, color=COLOURS[name], label=LABELS[name])
     bars.set_yticks(place, list(cases), fontsize=8)
     bars.invert_yaxis()
-    bars.set_xlabel("RMSE / m")
-    for panel in (over, bars):
-        plots.style(panel)
+    plots.style(bars, xlabel="RMSE / m")
     plots.legend_below(figure, over, columns=len(KERNELS))
     return figure
 

@@ -37,13 +37,9 @@ def some_tracks(result: Reproduction) -> Figure:
             panel.plot(*path.slave.T, color=colour, linewidth=1, label=NAMES[name])
             panel.plot(*path.master.T, color=colour, linewidth=2.5, alpha=0.7)
         seconds = track.time_s[-1] - track.time_s[0]
-        panel.set_title(
-            f"robot {track.slave} sees {track.master}, {seconds:.0f} s", fontsize=9.5, loc="left"
-        )
         panel.set_aspect("equal", adjustable="datalim")
-        panel.set_xlabel("x / m")
-        panel.set_ylabel("y / m")
-        plots.style(panel)
+        title = f"robot {track.slave} sees {track.master}, {seconds:.0f} s"
+        plots.style(panel, title=title, xlabel="x / m", ylabel="y / m")
     plots.legend_below(figure, panels[0], columns=1 + len(_COLOURS))
     return figure
 

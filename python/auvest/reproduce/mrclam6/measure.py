@@ -219,8 +219,7 @@ class Recording:
         after = np.searchsorted(known, time_s)
         inside = (after > 0) & (after < len(known))
         after = np.clip(after, 1, len(known) - 1)
-        there: npt.NDArray[np.bool_] = inside & (known[after] - known[after - 1] <= TRUTH_GAP_S)
-        return there
+        return inside & (known[after] - known[after - 1] <= TRUTH_GAP_S)
 
     def _pose(self, robot: int, time_s: Floats) -> Floats:
         truth = self._truth[robot]

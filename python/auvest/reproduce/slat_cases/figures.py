@@ -39,16 +39,13 @@ def _crossing_figure(cases: Cases) -> Figure:
             label = f"master {master}, {CROSSING_FILTERS[name]}"
             one_run.plot(time_s, across, style, color=colours[name], linewidth=1.1, label=label)
     one_run.axvline(MEET_S, color=plots.BLACK, linewidth=0.6)
-    one_run.set(xlabel="time / s", ylabel="one run: place across the course / m")
-    one_run.legend(fontsize=7)
+    plots.style(one_run, legend=7, xlabel="time / s", ylabel="one run: place across the course / m")
     for name, title in CROSSING_FILTERS.items():
         percent = 100 * curves[f"crossing_swapped_{name}"]
         share.plot(time_s, percent, color=colours[name], label=title)
     share.axvline(MEET_S, color=plots.BLACK, linewidth=0.6)
-    share.set(xlabel="time / s", ylabel="runs with the masters swapped / %", ylim=(0, 100))
-    share.legend(fontsize=7)
-    for axes in (one_run, share):
-        plots.style(axes)
+    ylabel = "runs with the masters swapped / %"
+    plots.style(share, legend=7, xlabel="time / s", ylabel=ylabel, ylim=(0, 100))
     return figure
 
 
@@ -69,15 +66,14 @@ def _turning_figure(cases: Cases) -> Figure:
                     cases.curves["turning_time_s"], error, color=colours[row["model"]], label=title
                 )
         axes.axvline(PAPER_MASTER.turn_start_s, color=plots.BLACK, linewidth=0.6)
-        axes.set(xlabel="time / s", ylabel="rms error over the runs / m")
-        axes.set_title(
-            f"odometry {case['sigma_speed_m_s']:g} m/s, {case['sigma_heading_rad']:g} rad",
-            fontsize=9.5,
-            loc="left",
+        plots.style(
+            axes,
+            title=f"odometry {case['sigma_speed_m_s']:g} m/s, {case['sigma_heading_rad']:g} rad",
+            legend=8,
+            xlabel="time / s",
+            ylabel="rms error over the runs / m",
+            ylim=(0, None),
         )
-        axes.set_ylim(bottom=0)
-        axes.legend(fontsize=8)
-        plots.style(axes)
     return figure
 
 

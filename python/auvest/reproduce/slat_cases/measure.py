@@ -24,6 +24,7 @@ from auvest import (
     SlatfJoint,
 )
 from auvest._arguments import Floats
+from auvest.scenarios._runs import standard_error
 from auvest.scenarios.paper_slatf import LEVELS, PARTICLES, paper_scenario
 from auvest.scenarios.slat import SlatResult, SlatScenario, Vehicle, simulate
 from auvest.slat import SlatFilter
@@ -328,19 +329,16 @@ def swapped(result: SlatResult) -> npt.NDArray[np.bool_]:
     apart = estimate[:, :, :, None, :] - result.masters[None, :, None, :, :]
     distance = np.hypot(apart[..., 0], apart[..., 1])
     right = distance[..., 0, 0] + distance[..., 1, 1]
-    wrong: npt.NDArray[np.bool_] = distance[..., 0, 1] + distance[..., 1, 0] < right
-    return wrong
+    return distance[..., 0, 1] + distance[..., 1, 0] < right
 
 
 def _rmse(error: Floats) -> Floats:
     """Root mean square of each run over pings and masters of errors (runs, pings, M, 2)."""
-    per_run: Floats = np.sqrt(np.square(error).sum(axis=-1).mean(axis=(1, 2)))
-    return per_run
+    return np.sqrt(np.square(error).sum(axis=-1).mean(axis=(1, 2)))
 
 
 def _mean(per_run: Floats) -> dict[str, float]:
-    error = per_run.std(ddof=1) / math.sqrt(len(per_run))
-    return {"mean": float(per_run.mean()), "standard_error": float(error)}
+    return {"mean": float(per_run.mean()), "standard_error": standard_error(per_run)}
 
 
 # ---- The page ------------------------------------------------------------------------------------

@@ -33,14 +33,12 @@ _MARKERS: Mapping[FilterName, str] = dict(zip(COLOURS, "os^DPv", strict=True))
 
 def _tracks(result: Reproduction) -> Figure:
     columns = tables(result)["fig02"]
-    figure = plots.new_figure((6.6, 4.4), "Fig. 2: true tracks")
-    axes = figure.add_subplot()
+    figure, axes = plots.new_axes((6.6, 4.4), "Fig. 2: true tracks")
     for name, colour in (("slave", plots.BLUE), ("master", plots.VERMILION)):
         x, y = columns[f"{name}_x_m"], columns[f"{name}_y_m"]
         axes.plot(x, y, color=colour, linewidth=1.8, label=name)
         axes.plot(x[0], y[0], "o", color=colour, markersize=5)
-    axes.set(xlabel="x / m", ylabel="y / m", aspect="equal")
-    plots.style(axes)
+    plots.style(axes, xlabel="x / m", ylabel="y / m", aspect="equal")
     plots.legend_below(figure, axes, columns=2)
     return figure
 
@@ -68,9 +66,7 @@ def _over_levels(
                 color=COLOURS[name],
                 label=text,
             )
-        axes.set_ylabel(label)
-        axes.set_ylim(bottom=0)
-        plots.style(axes)
+        plots.style(axes, ylabel=label, ylim=(0, None))
     levels = [LEVELS[n - 1] for n in numbers]
     bottom.set_xticks(
         list(places),
@@ -84,8 +80,7 @@ def _over_levels(
 def _over_time(result: Reproduction, *, stem: str, numbers: tuple[int, ...], title: str) -> Figure:
     columns = tables(result)[stem]
     time_s = columns["time_s"]
-    figure = plots.new_figure((6.6, 4.8), title)
-    axes = figure.add_subplot()
+    figure, axes = plots.new_axes((6.6, 4.8), title)
     for name, text in FILTERS.items():
         curves = [("", ":", text)]
         if name not in DEAF:
@@ -94,9 +89,8 @@ def _over_time(result: Reproduction, *, stem: str, numbers: tuple[int, ...], tit
         for level, line, label in curves:
             error = columns[f"{name}_{level}rms_error_m"]
             axes.plot(time_s, error, line, color=COLOURS[name], linewidth=1.5, label=label)
-    axes.set(xlabel="time / s", ylabel="position error, rms over the runs / m")
-    axes.set_ylim(bottom=0)
-    plots.style(axes)
+    ylabel = "position error, rms over the runs / m"
+    plots.style(axes, xlabel="time / s", ylabel=ylabel, ylim=(0, None))
     plots.legend_below(figure, axes, columns=2)
     return figure
 

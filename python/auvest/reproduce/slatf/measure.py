@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from auvest.reproduce.estimate import Estimate, Floats
+from auvest.scenarios._runs import standard_error
 from auvest.scenarios.paper_aukf import DTypeName
 from auvest.scenarios.paper_slatf import (
     ASSUMPTIONS,
@@ -179,8 +180,7 @@ def rmse(result: SlatResult) -> Estimate:
 def difference(a: SlatResult, b: SlatResult) -> Estimate:
     """RMSE of a less that of b, m; the runs are paired, they share their random numbers."""
     apart = a.run_rmse_m - b.run_rmse_m
-    spread = float(apart.std(ddof=1) / np.sqrt(len(apart))) if len(apart) > 1 else float("nan")
-    return Estimate(float(apart.mean()), spread)
+    return Estimate(float(apart.mean()), standard_error(apart))
 
 
 def mean_error(result: SlatResult) -> float:
@@ -195,8 +195,7 @@ def error_variance(result: SlatResult) -> float:
 
 def rms_per_ping(result: SlatResult) -> Floats:
     """Root mean square error over the runs at each ping, m."""
-    rms: Floats = np.sqrt(np.square(result.distance_m).mean(axis=0))
-    return rms
+    return np.sqrt(np.square(result.distance_m).mean(axis=0))
 
 
 # Machine-readable result.

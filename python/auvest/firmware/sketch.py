@@ -1,6 +1,6 @@
 """Compile an Arduino sketch with the library, as the Arduino IDE does.
 
-    python -m firmware.sketch SKETCH_DIR --library ZIP --output DIR
+    python -m auvest.firmware.sketch SKETCH_DIR --library ZIP --output DIR
 
 The work is done by arduino-builder, the program that the Arduino IDE 1.x itself runs: it turns the
 .ino file into C++, finds the libraries that the sketch includes, takes the compiler's options from
@@ -111,7 +111,9 @@ def compile_sketch(
     if not (sketch / f"{sketch.name}.ino").is_file():
         raise SketchError(f"{sketch}: a sketch is a folder with a file {sketch.name}.ino")
     if not library.is_file():
-        raise SketchError(f"{library}: no such library; make it with python -m firmware.package")
+        raise SketchError(
+            f"{library}: no such library; make it with python -m auvest.firmware.package"
+        )
     builder = shutil.which("arduino-builder")
     if builder is None:
         raise SketchError("arduino-builder is not installed: install arduino-builder")
@@ -188,10 +190,12 @@ def _definition(text: str) -> tuple[str, str]:
 
 def main() -> int:
     """Run the command line."""
-    parser = argparse.ArgumentParser(prog="firmware.sketch", description=__doc__.split("\n")[0])
+    parser = argparse.ArgumentParser(
+        prog="auvest.firmware.sketch", description=__doc__.split("\n")[0]
+    )
     parser.add_argument("sketch", type=Path, metavar="SKETCH_DIR", help="folder of the .ino file")
     parser.add_argument(
-        "--library", type=Path, required=True, metavar="ZIP", help="made by firmware.package"
+        "--library", type=Path, required=True, metavar="ZIP", help="made by auvest.firmware.package"
     )
     parser.add_argument(
         "--output", type=Path, required=True, metavar="DIR", help="where the program goes"
@@ -231,7 +235,7 @@ def main() -> int:
             warnings=arguments.warnings,
         )
     except SketchError as error:
-        print(f"firmware.sketch: {error}", file=sys.stderr)
+        print(f"auvest.firmware.sketch: {error}", file=sys.stderr)
         return 1
     print(compiled.report, end="", file=sys.stderr)
     print(compiled.elf)

@@ -1,14 +1,15 @@
 """Assemble the Arduino library: an installable zip.
 
-    python -m firmware.package [--output build/firmware]
+    python -m auvest.firmware.package [--output build/firmware]
 
 The library is ``firmware/library``, completed with what lives elsewhere or is generated:
 
-- ``src/auvest``: the headers of ``cpp/include``;
+- ``src/auvest``: the headers;
 - ``src/Eigen``: the headers of Eigen that these include, as the compilers list them;
 - ``src/*``: the C++ standard headers of ``firmware/avr_std``. Arduino puts ``src`` on the include
   path of every board, so each of them gives way to the toolchain's own where there is one;
-- the version, from ``pyproject.toml``, and the licences.
+- the names of types and of the values of ``Status``, which the IDE colours, from the headers;
+- the version and the licences.
 
 The same sources give the same bytes, whenever and wherever the zip is made.
 """
@@ -23,54 +24,52 @@ import shutil
 import subprocess
 import sys
 import zipfile
+from importlib.metadata import version
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
-NAME = "auvest"
+from auvest._headers import firmware_folder, include_folders
 
-_LIBRARY = ROOT / "firmware" / "library"
-_AVR_STD = ROOT / "firmware" / "avr_std"
-_HEADERS = ROOT / "cpp" / "include"
-_EIGEN = Path("/usr/include/eigen3")
-_EIGEN_LICENCE = Path("/usr/share/doc/libeigen3-dev/copyright")
+NAME = "auvest"
 
 # What includes what differs between a chip and a host; the library serves both kinds.
 _COMPILERS = {
-    "avr-g++": ("gcc-avr avr-libc", ["-mmcu=atmega2560", "-std=gnu++11", f"-I{_AVR_STD}"]),
+    "avr-g++": ("gcc-avr avr-libc", ["-mmcu=atmega2560", "-std=gnu++11"]),
     "g++": ("g++", ["-DARDUINO", "-std=gnu++17"]),
 }
+# A type of namespace auvest, which begins a line; what is for the library's own use.
+_TYPE = re.compile(r"^(?:class|struct|enum class|using) (\w+)(?![\w<;])", re.MULTILINE)
+_DETAIL = re.compile(r"namespace detail \{.*?\n\}  // namespace detail", re.DOTALL)
 
 
 class PackageError(RuntimeError):
     """The library could not be assembled; the message says what to do."""
 
 
-def version() -> str:
-    """Return the project's version."""
-    match = re.search(r'^version = "(.+)"$', (ROOT / "pyproject.toml").read_text(), re.MULTILINE)
-    if match is None:
-        raise PackageError("pyproject.toml: no line 'version = \"...\"'")
-    return match[1]
+def _holding(name: str, folders: list[Path]) -> Path:
+    """Give the folder that has the file."""
+    return next(folder for folder in folders if (folder / name).is_file())
 
 
-def eigen_headers() -> list[Path]:
-    """Return the headers of Eigen that auvest includes, relative to Eigen's include folder."""
-    if not (_EIGEN / "Eigen" / "Core").is_file():
-        raise PackageError(f"no Eigen in {_EIGEN}: install libeigen3-dev")
+def eigen_headers() -> tuple[Path, list[Path]]:
+    """Return Eigen's include folder and, relative to it, the headers that auvest includes."""
+    folders = include_folders(sources_first=True)
+    eigen = _holding("Eigen/Core", folders)
+    umbrella = _holding("auvest/auvest.hpp", folders) / "auvest" / "auvest.hpp"
     found = set()
     for compiler, (packages, options) in _COMPILERS.items():
         if shutil.which(compiler) is None:
             raise PackageError(f"{compiler} is not installed: install {packages}")
-        command = [compiler, "-M", *options, f"-I{_HEADERS}", f"-I{_EIGEN}"]
-        umbrella = _HEADERS / NAME / f"{NAME}.hpp"
+        command = [compiler, "-M", *options, *(f"-I{folder}" for folder in folders)]
+        if compiler == "avr-g++":
+            command.append(f"-I{firmware_folder() / 'avr_std'}")
         done = subprocess.run([*command, str(umbrella)], capture_output=True, text=True)
         if done.returncode != 0:
             raise PackageError(f"{shlex.join([*command, str(umbrella)])} failed:\n{done.stderr}")
         for word in shlex.split(done.stdout.replace("\\\n", " ")):
             path = Path(word)
-            if path.is_relative_to(_EIGEN):
-                found.add(path.relative_to(_EIGEN))
-    return sorted(found)
+            if path.is_relative_to(eigen / "Eigen"):
+                found.add(path.relative_to(eigen))
+    return eigen, sorted(found)
 
 
 def contents() -> dict[str, bytes]:
@@ -82,20 +81,37 @@ def contents() -> dict[str, bytes]:
             if path.is_file():
                 origins[target + path.relative_to(folder).as_posix()] = path
 
-    add(_LIBRARY)
-    add(_HEADERS, "src/")
-    add(_AVR_STD, "src/")
-    for header in eigen_headers():
-        origins[f"src/{header.as_posix()}"] = _EIGEN / header
-    origins["LICENSE"] = ROOT / "LICENSE"
-    if not _EIGEN_LICENCE.is_file():
-        raise PackageError(f"no {_EIGEN_LICENCE}, Eigen's licence: install libeigen3-dev")
-    origins["LICENSE-Eigen.txt"] = _EIGEN_LICENCE
+    sources = firmware_folder()
+    add(sources / "library")
+    headers = _holding("auvest/auvest.hpp", include_folders(sources_first=True))
+    add(headers / "auvest", "src/auvest/")
+    add(sources / "avr_std", "src/")
+    eigen, used = eigen_headers()
+    for header in used:
+        origins[f"src/{header.as_posix()}"] = eigen / header
+    tree = sources.parent
+    origins["LICENSE"] = _holding("LICENSE", [sources, tree]) / "LICENSE"
 
     files = {name: path.read_bytes() for name, path in origins.items()}
     for name in ("library.properties", "library.json"):
-        files[name] = files[name].replace(b"{version}", version().encode())
+        files[name] = files[name].replace(b"{version}", version(NAME).encode())
+    files["keywords.txt"] += _keywords(headers / "auvest").encode()
+    licences = _holding("README.Eigen", [eigen / "Eigen", tree / "cpp" / "licences"])
+    parts = [(licences / name).read_bytes() for name in ("README.Eigen", "COPYING.MPL2")]
+    files["LICENSE-Eigen.txt"] = b"\n".join(parts)
     return dict(sorted(files.items()))
+
+
+def _keywords(headers: Path) -> str:
+    """Name the types of namespace auvest and the values of its Status, as keywords.txt has them."""
+    types = set()
+    for path in headers.rglob("*.hpp"):
+        types |= set(_TYPE.findall(_DETAIL.sub("", path.read_text(encoding="utf-8"))))
+    status = (headers / "status.hpp").read_text(encoding="utf-8")
+    values = re.findall(r"^  (k\w+)", status, re.MULTILINE)
+    lines = ["", "# Types", *(f"{name}\tKEYWORD1" for name in sorted(types))]
+    lines += ["", "# Values of Status", *(f"{name}\tLITERAL1" for name in values), ""]
+    return "\n".join(lines)
 
 
 def package(output: Path) -> Path:
@@ -127,14 +143,16 @@ def package(output: Path) -> Path:
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content)
-    archive_path = output / f"{NAME}-{version()}.zip"
+    archive_path = output / f"{NAME}-{version(NAME)}.zip"
     archive_path.write_bytes(buffer.getvalue())
     return archive_path
 
 
 def main() -> int:
     """Run the command line."""
-    parser = argparse.ArgumentParser(prog="firmware.package", description=__doc__.split("\n")[0])
+    parser = argparse.ArgumentParser(
+        prog="auvest.firmware.package", description=__doc__.split("\n")[0]
+    )
     parser.add_argument(
         "--output",
         type=Path,
@@ -146,7 +164,7 @@ def main() -> int:
     try:
         print(package(arguments.output))
     except PackageError as error:
-        print(f"firmware.package: {error}", file=sys.stderr)
+        print(f"auvest.firmware.package: {error}", file=sys.stderr)
         return 1
     return 0
 

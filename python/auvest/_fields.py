@@ -1,0 +1,79 @@
+"""Fields of dataclasses that say what they take: of models, policies, scenarios and settings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import field, fields
+from functools import partial
+from typing import Any
+
+from auvest._arguments import as_flag, as_instance, as_integer, as_kind, as_number, as_pair
+
+#: Takes the name of a field and what was given; returns what is kept, or refuses it.
+Take = Callable[[str, Any], Any]
+
+
+class Checked:
+    """Base of frozen dataclasses: what was given is taken by the fields, in their order."""
+
+    def __post_init__(self) -> None:
+        for entry in fields(self):  # type: ignore[arg-type]
+            if "take" in entry.metadata:
+                value = entry.metadata["take"](entry.name, getattr(self, entry.name))
+                object.__setattr__(self, entry.name, value)
+
+
+def _field(default: Any, take: Take) -> Any:
+    return field(default=default, metadata={"take": take})
+
+
+def number(default: float) -> Any:
+    """Take a finite number."""
+    return _field(default, as_number)
+
+
+def positive(default: float, *, infinite: bool = False) -> Any:
+    """Take a number above 0."""
+    return _field(default, partial(as_number, bound="positive", infinite=infinite))
+
+
+def not_negative(default: float) -> Any:
+    """Take a finite number of at least 0."""
+    return _field(default, partial(as_number, bound="not negative"))
+
+
+def fraction(default: float) -> Any:
+    """Take a number from 0 to 1."""
+
+    def take(name: str, given: object) -> float:
+        value = as_number(name, given, "not negative")
+        if value > 1:
+            raise ValueError(f"{name} must lie in 0..1, not {value}")
+        return value
+
+    return _field(default, take)
+
+
+def integer(default: int, low: int, high: int) -> Any:
+    """Take an integer from ``low`` to ``high``."""
+    return _field(default, partial(as_integer, low=low, high=high))
+
+
+def flag(default: bool) -> Any:
+    """Take True or False."""
+    return _field(default, as_flag)
+
+
+def choice(default: str, *others: str) -> Any:
+    """Take one of a few names."""
+    return _field(default, partial(as_kind, kinds=(default, *others)))
+
+
+def pair(default: Any) -> Any:
+    """Take two finite numbers, for example a position."""
+    return _field(as_pair("default", default), as_pair)
+
+
+def instance(of: type) -> Any:
+    """Take an instance of a class; default: one with its defaults."""
+    return field(default_factory=of, metadata={"take": partial(as_instance, expected=of)})
