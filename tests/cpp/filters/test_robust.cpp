@@ -406,4 +406,35 @@ TEST_CASE("robust update: refuses what the plain one refuses, and bad parameters
   CHECK(filter.restore(filter.belief(), bad) == Status::kBadParameter);
 }
 
+TEST_CASE("robust update: what was saved goes on with the same bits, whatever the rule before") {
+  using Rule = auvest::RobustUpdate<auvest::Igg<double>, auvest::RejectionStreak<double>>;
+  auto filter = robust_ekf(Rule());
+  const Vector<double, kM> far(30, -40);
+  REQUIRE(filter.update(far, sensor()).decision == Decision::kRejected);
+  REQUIRE(filter.rule().recovery.count > 0);
+  Rule bad;
+  bad.params.tolerance = -1;
+  auvest::Robust<auvest::Ekf<Process>, Rule> other(auvest::Ekf<Process>(still()), bad);
+  CHECK(other.check() == Status::kBadParameter);
+  CHECK(other.restore(filter.belief()) == Status::kBadParameter);  // with the rule that it has
+  CHECK_FALSE(other.initialised());
+  REQUIRE(other.restore(filter.belief(), filter.rule()) == Status::kOk);
+  CHECK(other.check() == Status::kOk);
+  for (int k = 0; k < 8; ++k) {
+    const auto a = filter.update(far, sensor());
+    const auto b = other.update(far, sensor());
+    CHECK(a.recovered == b.recovered);
+    CHECK(filter.rule().recovery.count == other.rule().recovery.count);
+    CHECK(same_bits(filter.x(), other.x()));
+    CHECK(same_bits(filter.P(), other.P()));
+  }
+  CHECK(other.reset(Vector<double, kN>::Zero(), prior()) == Status::kOk);
+  CHECK(other.rule().recovery.count == 0);
+  // A belief that is refused leaves the rule, too.
+  auto broken = filter.belief();
+  broken.x(0) = std::nan("");
+  CHECK(other.restore(broken, filter.rule()) == Status::kNotFinite);
+  CHECK(other.rule().recovery.count == 0);
+}
+
 }  // namespace
