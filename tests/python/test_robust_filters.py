@@ -232,6 +232,11 @@ CASES = {
     "k0": (lambda: auvest.Igg(k0=0.0), ValueError, "k0 must be positive"),
     "k1": (lambda: auvest.Igg(k1=1.0), ValueError, "k0 <= k1 is required, not k0=1.5, k1=1.0"),
     "hampel": (lambda: auvest.Hampel(c=math.inf), ValueError, "c must be finite"),
+    "hampel order": (
+        lambda: auvest.Hampel(a=2.0, b=1.0, c=3.0),
+        ValueError,
+        r"a <= b <= c is required, not a=2\.0, b=1\.0, c=3\.0",
+    ),
     "rejections": (lambda: auvest.RejectionStreak(rejections=0), ValueError, r"1\.\.60, not 0"),
     "recovery": (lambda: slave(recovery=6), TypeError, "recovery must be an auvest.Reje"),
     "residual": (lambda: slave(residual="both"), ValueError, "residual must be 'innovation' or"),

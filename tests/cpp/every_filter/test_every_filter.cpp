@@ -271,14 +271,14 @@ TEST_CASE(
     const auto rows = record(member, 40);
     const auto filter = begun(member, member.whole());
     const auto again = begun(member, member.whole());
-    const Numbers at_first = filter->state();
+    const double at_first = filter->interval();
     std::vector<Numbers> expected;
     for (const Row& row : rows) {
       expected.push_back(step(*filter, row));
       REQUIRE(step(*again, row) == expected.back());
     }
     REQUIRE(filter->reset(start(member), prior(member)) == Status::kOk);
-    REQUIRE(filter->state() == at_first);
+    REQUIRE(filter->interval() == at_first);
     const auto assigned = member.whole();
     for (std::size_t k = 0; k < rows.size(); ++k) {
       if (k == 20) {
