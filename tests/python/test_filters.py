@@ -225,6 +225,18 @@ def test_reference_at_the_start_matters_to_the_law():
 
 
 @pytest.mark.parametrize(
+    "policy",
+    [
+        auvest.FixedInterval(interval_s=0.3),
+        auvest.CovarianceBudget(initial_s=0.3),
+        auvest.MahalanobisInterval(initial_s=0.3),
+    ],
+)
+def test_the_first_interval_is_that_of_the_policy(policy):
+    assert make(auvest.Aukf, policy=policy).interval == 0.3
+
+
+@pytest.mark.parametrize(
     "policy", [auvest.FixedInterval(interval_s=0.3), auvest.CovarianceBudget()]
 )
 def test_other_policies(policy):

@@ -351,3 +351,17 @@ def test_rejections_of_what_does_not_see_the_position_do_not_widen_it(kind, dtyp
         assert f.report.decision == Decision.rejected
     assert f.report.recovered  # that is all that the rule can do: the position is not to blame
     assert same_bits(f.P, before)
+
+
+@pytest.mark.parametrize("kind", [auvest.RobustEkf, auvest.RobustUkf])
+def test_without_a_recovery_nothing_ends_a_lock_out(kind):
+    """What is rejected leaves the belief as it is, however often; a streak would widen it."""
+    alone, helped = (slave(kind, recovery=r) for r in (None, auvest.RejectionStreak()))
+    start = alone.P
+    for _ in range(20):
+        for f in (alone, helped):
+            f.update(500.0, place=[100.0, 0.0])
+        assert alone.report.decision == Decision.rejected
+        assert not alone.report.recovered
+        assert same_bits(alone.P, start)
+    assert helped.P[0, 0] > 100 * start[0, 0]
