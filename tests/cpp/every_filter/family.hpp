@@ -18,6 +18,12 @@ using Numbers = std::vector<double>;
 
 const int kMaxSize = 6;  ///< numbers in a measurement; those of a smaller one are the first
 
+/// A parameter, and what the model says where it is some number and all others are as usual.
+struct Checked {
+  std::string parameter;
+  Status status;
+};
+
 /// A process of the registry with its default parameters.
 struct Process {
   int states = 0;
@@ -26,6 +32,7 @@ struct Process {
 
   virtual ~Process() = default;
   virtual Status check() const = 0;
+  virtual std::vector<Checked> check_with(double value) const = 0;
   virtual Eigen::VectorXd f(const Eigen::VectorXd& x, double dt, const Numbers& input) const = 0;
   virtual Eigen::MatrixXd Phi(const Eigen::VectorXd& x, double dt, const Numbers& input) const = 0;
   virtual Eigen::MatrixXd Q(double dt, const Numbers& input) const = 0;
@@ -37,6 +44,7 @@ struct Sensor {
 
   virtual ~Sensor() = default;
   virtual Status check() const = 0;
+  virtual std::vector<Checked> check_with(double value) const = 0;
   virtual Eigen::VectorXd h(const Eigen::VectorXd& x) const = 0;
   virtual Eigen::MatrixXd H(const Eigen::VectorXd& x) const = 0;  ///< for all states
   virtual Eigen::MatrixXd R() const = 0;

@@ -75,6 +75,32 @@ struct InputOf<Model, decltype(Model().input, Status())> {
   }
 };
 
+/// Sets one of the parameters that are visited.
+template <class Scalar>
+struct SetOne {
+  int left;
+  Scalar value;
+  std::string name;
+
+  void operator()(const char* parameter, Scalar& number) {
+    if (left-- != 0) return;
+    number = value;
+    name = parameter;
+  }
+};
+
+template <class Model>
+std::vector<Checked> check_each(double value) {
+  std::vector<Checked> result;
+  for (int i = 0;; ++i) {
+    typename Model::Params params;
+    SetOne<typename Model::Scalar> set{i, typename Model::Scalar(value), std::string()};
+    params.visit(set);
+    if (set.name.empty()) return result;
+    result.push_back({set.name, Model(params).check()});
+  }
+}
+
 template <class Model>
 struct ProcessOf final : Process {
   using Scalar = typename Model::Scalar;
@@ -86,6 +112,7 @@ struct ProcessOf final : Process {
   }
 
   Status check() const override { return Model{}.check(); }
+  std::vector<Checked> check_with(double value) const override { return check_each<Model>(value); }
   Eigen::VectorXd f(const Eigen::VectorXd& x, double dt, const Numbers& input) const override {
     return driven(input)
         .f(matrix<typename Model::State>(x.data()), Scalar(dt))
@@ -113,6 +140,7 @@ struct SensorOf final : Sensor {
   SensorOf() { size = Model::kSize; }
 
   Status check() const override { return Model{}.check(); }
+  std::vector<Checked> check_with(double value) const override { return check_each<Model>(value); }
   Eigen::VectorXd h(const Eigen::VectorXd& x) const override {
     return Model{}.h(matrix<typename Model::State>(x.data())).template cast<double>();
   }

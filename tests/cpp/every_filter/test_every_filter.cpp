@@ -135,6 +135,40 @@ Numbers step(Filter& filter, const Row& row) {
   return seen;
 }
 
+// ---- Models.
+
+template <class Model>
+void check_parameters(const Model& model) {
+  REQUIRE(model.check() == Status::kOk);
+  CHECK(model.check_with(0.25).size() > 0);
+  for (const double bad : {kNan, kInfinity, -kInfinity}) {
+    for (const Checked& checked : model.check_with(bad)) {
+      CAPTURE(checked.parameter);
+      CHECK(checked.status == Status::kBadParameter);
+    }
+  }
+  // But for where something stands, and for correlations, all are sizes.
+  for (const Checked& checked : model.check_with(-0.25)) {
+    const std::string& name = checked.parameter;
+    CAPTURE(name);
+    const auto begins = [&](const char* word) { return name.find(word) == 0; };
+    const bool signed_number =
+        begins("station_") || begins("leader_") || begins("heading_") || begins("cov_");
+    CHECK(checked.status == (signed_number ? Status::kOk : Status::kBadParameter));
+  }
+}
+
+TEST_CASE("every model refuses parameters that are not finite, and sizes below zero") {
+  for (const Member& member : all_members()) {
+    CAPTURE(member.name);
+    check_parameters(*member.process);
+    for (std::size_t k = 0; k < member.sensors.size(); ++k) {
+      CAPTURE(k);
+      check_parameters(*member.sensors[k]);
+    }
+  }
+}
+
 // ---- Equivalences.
 
 TEST_CASE("every filter: a kernel that doubts nothing gives the bits of the plain filter") {
