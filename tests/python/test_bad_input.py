@@ -291,6 +291,23 @@ CONSTRUCTORS = {
 }
 
 
+def test_the_limits_of_the_law_belong_to_it():
+    for scale in (0.0, 1.0):
+        assert auvest.MahalanobisInterval(scale=scale).scale == scale
+    assert auvest.MahalanobisInterval(ratio_max=1.0).ratio_max == 1
+
+
+def test_a_record_may_have_as_many_rows_as_are_taken_at_once(monkeypatch):
+    f = make(auvest.Ekf)
+    z = measure(straight(5))
+    monkeypatch.setattr("auvest._arguments.MAX_ROWS", 5)
+    assert len(f.run(z, dt=0.5)) == 5
+    before = everything(f)
+    with pytest.raises(ValueError, match="z has 6 rows, at most 5 are taken at once"):
+        f.run(measure(straight(6)), dt=0.5)
+    assert everything(f) == before
+
+
 @pytest.mark.parametrize("case", CONSTRUCTORS)
 def test_constructors(case):
     call, error, message = CONSTRUCTORS[case]

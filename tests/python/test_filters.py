@@ -201,12 +201,39 @@ def test_ratio_by_hand():
     assert f.ratio == pytest.approx(0.05**2 / (d_e2 + 1e-4), rel=1e-9)
 
 
+def test_without_a_reference_the_estimate_is_desired():
+    f, told = make(auvest.Aukf), make(auvest.Aukf)
+    for row in measure(straight(12)):
+        for g in (f, told):
+            g.predict()
+            g.update(row)
+        assert f.feedback() == told.feedback(told.x[:2])
+        assert (f.tau, f.ratio, f.mahalanobis_squared) == (
+            told.tau,
+            told.ratio,
+            told.mahalanobis_squared,
+        )
+    assert told.feedback(told.x[[0, 0]]) != f.feedback()  # the law looks at both coordinates
+
+
 def test_reference_at_the_start_matters_to_the_law():
     near, far = make(auvest.Aukf), make(auvest.Aukf, reference=[4.0, -1.0])
     for f in (near, far):
         f.predict()
         f.feedback([3.02, -0.97])
     assert near.ratio < far.ratio  # the second desired track has moved by a metre
+
+
+@pytest.mark.parametrize(
+    "policy",
+    [
+        auvest.FixedInterval(interval_s=0.3),
+        auvest.CovarianceBudget(initial_s=0.3),
+        auvest.MahalanobisInterval(initial_s=0.3),
+    ],
+)
+def test_the_first_interval_is_that_of_the_policy(policy):
+    assert make(auvest.Aukf, policy=policy).interval == 0.3
 
 
 @pytest.mark.parametrize(

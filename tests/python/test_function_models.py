@@ -129,7 +129,7 @@ def test_the_models_themselves():
     assert per_second.state == ("x_0", "x_1", "x_2", "x_3", "x_4", "x_5")
 
 
-@pytest.mark.parametrize("x", [0.3, 30.0, -3e3])
+@pytest.mark.parametrize("x", [0.3, 30.0, -3e3, 1e7])
 def test_derivatives_are_as_right_as_they_are_said_to_be(x):
     """exp, sin and a cubic about the scale of the argument: 1e-11 of the size of f."""
     scale = max(1.0, abs(x))

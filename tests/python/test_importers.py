@@ -138,6 +138,25 @@ def test_mrclam6_makes_each_robot_the_slave_of_the_others(tmp_path: Path) -> Non
     np.testing.assert_allclose(whole(logs["robot1"], "truth.csv"), [[0, 1, 1.5, 0.25]], rtol=1e-15)
 
 
+def test_mrclam_counts_time_from_the_first_whole_second(tmp_path: Path) -> None:
+    """All of a robot's files have one clock; a barcode that no robot wears is left out."""
+    files = {"Barcodes.dat": "# subject barcode\n1 5\n2 14\n3 41\n4 32\n5 23\n6 72\n"}
+    for robot in range(1, 6):
+        files[f"Robot{robot}_Groundtruth.dat"] = f"100.{robot} {robot}.0 1.0 0.5\n"
+        files[f"Robot{robot}_Odometry.dat"] = f"101.5 0.25 0.0{robot}\n"
+        files[f"Robot{robot}_Measurement.dat"] = "101.0 99 7.0 0.0\n102.0 72 8.0 0.0\n"
+    files["Robot1_Measurement.dat"] += "# time barcode range bearing\n103.25 14 5.0 0.1\n"
+    logs = imported(tmp_path, "mrclam", files)
+    assert list(logs) == [f"robot{robot}" for robot in range(1, 6)]
+    for robot, log in enumerate(logs.values(), start=1):
+        np.testing.assert_allclose(whole(log, "odometry.csv"), [[1.5, 0.25, robot / 100]])
+        truth = [[robot / 10, robot, 1.0, 0.5]]
+        np.testing.assert_allclose(whole(log, "truth.csv"), truth, atol=1e-12)
+    assert whole(logs["robot1"], "ranges.csv") == [[3.25, 2, 5.0]]
+    assert whole(logs["robot2"], "ranges.csv") == [[3.25, 1, 5.0]]
+    assert whole(logs["robot3"], "ranges.csv") == []
+
+
 def test_ugps_pier59_leaves_out_polls_without_a_fix(tmp_path: Path) -> None:
     """Forward is +x and starboard +y: a fix 3 m ahead and 4 m to port is 5 m off."""
     text = "t,valid,x_fwd,y_stbd\n0.0,1,3.0,-4.0\n0.5,0,3.0,4.0\n1.0,1,0.0,2.0\n"

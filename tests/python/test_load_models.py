@@ -277,14 +277,15 @@ def test_a_model_that_is_not_complete_for_an_ekf_serves_the_others(small_header)
         ekf.update(5.0, models.RangeOnly())
     with pytest.raises(ValueError, match=r"Drift has no Phi\(x, dt\)"):
         models.Drift().Phi(1.0)
+    start["P0"] = np.diag([1.0, 1.5, 1.0, 1.0, 1.0])
     for kind in (auvest.Ukf, auvest.Ckf):
-        # The budget asks for P_xx + P_yy = 2 + 2 T psd; it must come to 3 after 2 s.
-        budget = auvest.CovarianceBudget(position_sigma_m=3**0.5, min_s=0.5, max_s=10)
+        # The budget asks for P_xx + P_yy = 2.5 + 2 T psd; it must come to 3.5 after 2 s.
+        budget = auvest.CovarianceBudget(position_sigma_m=3.5**0.5, min_s=0.5, max_s=10)
         filter_ = kind(**start, policy=budget)
         assert filter_.feedback() == pytest.approx(2, rel=1e-2)
         filter_.predict(2.0, [1, 0])
         assert filter_.x == pytest.approx([5, 4, 0, 0, 0])
-        assert pytest.approx(1.5 * np.eye(5)) == filter_.P
+        assert pytest.approx(start["P0"] + 0.5 * np.eye(5)) == filter_.P
         filter_.update(6.0, models.RangeOnly())
         assert filter_.innovation[0] == pytest.approx(6 - np.hypot(5, 4), abs=0.2)
 

@@ -27,6 +27,13 @@ def test_nees_of_known_vectors():
         metrics.nees(error, p[0])
 
 
+def test_nees_is_nan_where_an_input_is_not_finite():
+    p = np.array([np.eye(2), np.diag([np.inf, 1.0]), np.diag([np.nan, 1.0]), np.eye(2)])
+    value = metrics.nees([[1.0, 2.0], [1.0, 2.0], [1.0, 2.0], [np.inf, 2.0]], p)
+    assert value[0] == pytest.approx(5)
+    assert np.isnan(value[1:]).all()
+
+
 def test_chi2_bounds():
     # 95 % of one chi-square value with 2 degrees of freedom: -2 ln(0.975), -2 ln(0.025).
     assert metrics.chi2_bounds(2) == pytest.approx((-2 * np.log(0.975), -2 * np.log(0.025)))

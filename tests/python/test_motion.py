@@ -16,18 +16,28 @@ from auvest.replay.motion import Motion, carry, dead_reckon, phi
 SETTINGS = OdometrySettings()
 
 
-def increments(folder: Path, rows: list[list[float]], start_s: float) -> Motion:
+def increments(
+    folder: Path,
+    rows: list[list[float]],
+    start_s: float,
+    settings: OdometrySettings = SETTINGS,
+) -> Motion:
     """Lines ``[time, forward, left, turn]``."""
     time_s, forward, left, turn = np.array(rows).T
     write_file(folder, "odometry.csv", time_s=time_s, forward_m=forward, left_m=left, turn_rad=turn)
-    return Motion(CsvTable(folder / "odometry.csv"), start_s, SETTINGS)
+    return Motion(CsvTable(folder / "odometry.csv"), start_s, settings)
 
 
-def velocities(folder: Path, rows: list[list[float]], start_s: float) -> Motion:
+def velocities(
+    folder: Path,
+    rows: list[list[float]],
+    start_s: float,
+    settings: OdometrySettings = SETTINGS,
+) -> Motion:
     """Lines ``[time, speed, yaw rate]``."""
     time_s, speed, rate = np.array(rows).T
     write_file(folder, "odometry.csv", time_s=time_s, speed_m_s=speed, yaw_rate_rad_s=rate)
-    return Motion(CsvTable(folder / "odometry.csv"), start_s, SETTINGS)
+    return Motion(CsvTable(folder / "odometry.csv"), start_s, settings)
 
 
 def place(motion: Motion, start_s: float, time_s: float) -> complex:
@@ -49,6 +59,23 @@ def test_increments_that_end_at_the_start_or_before_have_been_driven(tmp_path: P
     assert motion.edges.tolist() == [1.0, 2.0, 3.0]
     assert place(motion, 1.0, 2.0) == pytest.approx(1.0)
     assert place(motion, 1.0, 3.0) == pytest.approx(1 + 2j)
+
+
+def test_calibration_scales_speed_and_turn_and_adds_the_drift_of_the_gyroscope(
+    tmp_path: Path,
+) -> None:
+    """2 s at 3 m/s and 0.25 rad/s as recorded, whichever way it was."""
+    settings = OdometrySettings(speed_factor=2.0, turn_factor=3.0, turn_offset_rad_s=0.125)
+    driven = increments(tmp_path, [[1.0, 0, 0, 0], [3.0, 6.0, 0.5, 0.5]], 1.0, settings)
+    driven.add(np.array([[1.0, 0, 0, 0], [3.0, 6.0, 0.5, 0.5]]))
+    chord, turn = driven.until(3.0).steps(np.array([1.0]), np.array([2.0]))
+    assert turn == pytest.approx([3.0 * 0.5 + 0.125 * 2])
+    assert chord == pytest.approx([2.0 * (6 + 0.5j)])  # an increment is a chord
+    held = velocities(tmp_path, [[1.0, 3.0, 0.25], [3.0, 0, 0]], 1.0, settings)
+    held.add(np.array([[1.0, 3.0, 0.25], [3.0, 0, 0]]))
+    chord, turn = held.until(3.0).steps(np.array([1.0]), np.array([2.0]))
+    assert turn == pytest.approx([(3.0 * 0.25 + 0.125) * 2])
+    assert np.abs(chord) == pytest.approx(2.0 * 3.0 * 2 * np.sin(turn / 2) / (turn / 2))
 
 
 def test_an_increment_that_straddles_the_start_is_all_driven_after_it(tmp_path: Path) -> None:

@@ -232,6 +232,11 @@ CASES = {
     "k0": (lambda: auvest.Igg(k0=0.0), ValueError, "k0 must be positive"),
     "k1": (lambda: auvest.Igg(k1=1.0), ValueError, "k0 <= k1 is required, not k0=1.5, k1=1.0"),
     "hampel": (lambda: auvest.Hampel(c=math.inf), ValueError, "c must be finite"),
+    "hampel order": (
+        lambda: auvest.Hampel(a=2.0, b=1.0, c=3.0),
+        ValueError,
+        r"a <= b <= c is required, not a=2\.0, b=1\.0, c=3\.0",
+    ),
     "rejections": (lambda: auvest.RejectionStreak(rejections=0), ValueError, r"1\.\.60, not 0"),
     "recovery": (lambda: slave(recovery=6), TypeError, "recovery must be an auvest.Reje"),
     "residual": (lambda: slave(residual="both"), ValueError, "residual must be 'innovation' or"),
@@ -346,3 +351,17 @@ def test_rejections_of_what_does_not_see_the_position_do_not_widen_it(kind, dtyp
         assert f.report.decision == Decision.rejected
     assert f.report.recovered  # that is all that the rule can do: the position is not to blame
     assert same_bits(f.P, before)
+
+
+@pytest.mark.parametrize("kind", [auvest.RobustEkf, auvest.RobustUkf])
+def test_without_a_recovery_nothing_ends_a_lock_out(kind):
+    """What is rejected leaves the belief as it is, however often; a streak would widen it."""
+    alone, helped = (slave(kind, recovery=r) for r in (None, auvest.RejectionStreak()))
+    start = alone.P
+    for _ in range(20):
+        for f in (alone, helped):
+            f.update(500.0, place=[100.0, 0.0])
+        assert alone.report.decision == Decision.rejected
+        assert not alone.report.recovered
+        assert same_bits(alone.P, start)
+    assert helped.P[0, 0] > 100 * start[0, 0]

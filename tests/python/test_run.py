@@ -293,3 +293,19 @@ def test_a_filter_in_use_refuses_a_second_thread():
             if refused > 0:
                 break
     assert refused > 0
+
+
+@pytest.mark.parametrize("kind", [auvest.Ekf, auvest.Ukf])
+def test_the_window_reaches_back_all_of_late_s_whatever_the_steps(kind):
+    """Predictions end 0, 0.1, 0.6, 1.1, 1.6 and 2.1 s ago: 1.9 s ago is nearest to the last."""
+    in_time, late, other = (make(kind, late_s=2.0) for _ in range(3))
+    for k, dt in enumerate([0.5] * 6 + [0.1]):
+        for f in (in_time, late, other):
+            f.predict(dt)
+        if k == 1:
+            in_time.update([4.0, -0.8])
+    late.update([4.0, -0.8], age_s=1.9)
+    assert same_bits(late.x, in_time.x)
+    assert same_bits(late.P, in_time.P)
+    with pytest.raises(auvest.FilterError, match=r"age_s = 2\.1 is more than late_s = 2\.0"):
+        other.update([4.0, -0.8], age_s=2.1)

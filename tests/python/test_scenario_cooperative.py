@@ -183,6 +183,10 @@ def test_what_a_simulation_cannot_take_is_refused():
         simulate(auvest.Slatf([0, 0], np.eye(2)))
     with pytest.raises(ValueError, match=r"dropout must lie in 0\.\.1, not 1\.5"):
         Scenario(dropout=1.5)
+    for every in (0, 11):  # longer than the filter's memory
+        with pytest.raises(ValueError, match=rf"range_every must lie in 1\.\.10, not {every}"):
+            Scenario(range_every=every)
+    assert Scenario(range_every=10).range_every == 10
     with pytest.raises(ValueError, match="timing must be 'at-once'"):
         Scenario(timing="late")
     with pytest.raises(ValueError, match="outlier_sigma_m must be positive"):

@@ -401,6 +401,8 @@ def test_outage_refuses_a_state_that_is_none() -> None:
 def test_outage_of_dead_reckoning_equals_it() -> None:
     outage = Outage(DeadReckoning(START, CERTAIN))
     outage.share([3, 4], np.eye(2), [(MASTER_X, MASTER_P)])
+    with pytest.raises(ValueError, match="there is no master 0: none was added"):
+        outage.master(0)  # it tracks none, so that there is none before the outage either
     alone = DeadReckoning([3, 4], np.eye(2))
     for one in (outage, alone):
         one.predict(1.5, [4, 0.2])

@@ -87,6 +87,24 @@ def test_copies_are_independent():
     assert everything(f) == before
 
 
+@pytest.mark.parametrize("kind", [auvest.Ekf, auvest.Ukf])
+def test_what_drives_the_process_is_part_of_the_state(kind):
+    """An interval policy predicts with it: Q of a slave that sails is not that of one at rest."""
+    options = {
+        "process": auvest.SpeedHeading(sigma_forward=0.1, sigma_heading=0.1),
+        "sensors": auvest.LeaderRange(),
+        "policy": auvest.CovarianceBudget(position_sigma_m=0.3, min_s=0.1, initial_s=1.0, max_s=4),
+    }
+    f, other, at_rest = (kind([0.0, 0.0], 0.01 * np.eye(2), **options) for _ in range(3))
+    f.predict(0.0, [2.0, 0.0, 0.5])
+    other.restore(f.save())
+    copied = copy.copy(f)
+    # 0.02 + dt (0.1^2 + 0.1^2 2^2) = 0.3^2, and at rest 0.02 + dt 0.1^2, which 4 s do not reach.
+    assert f.feedback() == pytest.approx(1.4, abs=3.9 / 1024)
+    assert at_rest.feedback() == 4
+    assert other.feedback() == copied.feedback() == f.interval
+
+
 def test_a_fresh_filter_can_be_saved():
     f = make(auvest.Ukf)
     twin = pickle.loads(pickle.dumps(f))

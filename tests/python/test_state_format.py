@@ -87,10 +87,11 @@ def test_every_truncation_and_extension_is_refused():
             _state.unpack(state + more, "Ekf", DESCRIPTION)
 
 
-def test_another_version_is_refused_and_named():
+@pytest.mark.parametrize("version", [0, 2])
+def test_another_version_is_refused_and_named(version):
     state = bytearray(packed())
-    struct.pack_into("<I", state, 8, 2)
-    with pytest.raises(ValueError, match="version 2 of the format, expected 1"):
+    struct.pack_into("<I", state, 8, version)
+    with pytest.raises(ValueError, match=f"version {version} of the format, expected 1"):
         _state.unpack(sealed(bytes(state)), "Ekf", DESCRIPTION)
 
 

@@ -1,4 +1,4 @@
-"""The float64 UKF against the textbook form with 60 digits.
+"""The float64 UKF against the textbook form with 60 digits, and all points where nothing is linear.
 
 The textbook form (Julier and Uhlmann's scaled transform: weights lambda/c, 1/(2c), beta; 13 sigma
 points, also through the linear process) is written here from the formulas, with nothing in common
@@ -173,3 +173,50 @@ def test_the_textbook_form_in_double_would_fail_at_the_alpha_of_the_paper():
         book.update([4.2, 3.1])
         ukf.update([4.2, 3.1])
         assert np.abs(ukf.x - as_array(book.x)[:, 0]).max() > 1e-6
+
+
+def spherical_points(x, p):
+    """The mean and, at a distance of sqrt n, 2 n points of equal weight."""
+    offsets = np.sqrt(len(x)) * np.linalg.cholesky(p).T
+    return np.concatenate([x[np.newaxis], x + offsets, x - offsets])
+
+
+@pytest.mark.parametrize(("kind", "centre_weight"), [(auvest.Ckf, 0.0), (auvest.Ukf, 2.0)])
+def test_points_agree_with_their_textbook_form_where_nothing_is_linear(kind, centre_weight):
+    """A pose by odometry and its bearings: Arasaratnam and Haykin's points of 2009; those of a UKF
+    with alpha = 1 and kappa = 0, n = 3, are the same, and the centre counts beta = 2 times in P.
+    """
+    process = auvest.Odometry(sigma_distance=0.05, sigma_drift=0.3, sigma_turn=0.02)
+    sensor = auvest.RangeBearing(station=(0.2, 2.0), sigma_range_m=0.05, sigma_bearing_rad=0.1)
+    x, p = np.array([-4.0, 1.0, 0.4]), np.array([[0.2, 0.05, 0.01], [0.05, 0.3, 0], [0.01, 0, 0.1]])
+    r = np.diag([0.05**2, 0.1**2])
+    f = kind(x, p, process=process, sensors=sensor)
+    ekf = auvest.Ekf(x, p, process=process, sensors=sensor)
+    weights = np.array([centre_weight, *[1 / 6] * 6])
+    rng = np.random.default_rng(3)
+    for k in range(20):
+        motion = np.array([0.2, 0.05, 0.3 * np.sin(k)])
+        moved = np.array([process.f(point, 0.5, motion) for point in spherical_points(x, p)])
+        x = moved[1:].mean(axis=0)
+        p = (weights * (moved - x).T) @ (moved - x) + process.Q(0.5, motion)
+        for g in (f, ekf):
+            g.predict(0.5, motion)
+        np.testing.assert_allclose(f.x, x, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(f.P, p, rtol=0, atol=1e-12)
+
+        points = spherical_points(x, p)
+        seen = np.array([sensor.h(point) for point in points])
+        seen[:, 1] = np.unwrap(seen[:, 1])  # across +-pi
+        mean = seen[1:].mean(axis=0)
+        z = mean + [0.05, 0.1] * rng.standard_normal(2)
+        s = (weights * (seen - mean).T) @ (seen - mean) + r
+        gain = (weights * (points - x).T) @ (seen - mean) @ np.linalg.inv(s)
+        x = x + gain @ (z - mean)
+        p = p - gain @ s @ gain.T
+        for g in (f, ekf):
+            g.update([z[0], np.angle(np.exp(1j * z[1]))])
+        assert not f.near_field
+        np.testing.assert_allclose(f.S, s, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(f.x, x, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(f.P, p, rtol=0, atol=1e-12)
+    assert np.abs(ekf.x - x).max() > 1e-3

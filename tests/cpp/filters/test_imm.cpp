@@ -143,6 +143,11 @@ TEST_CASE("models are refused where shares are none, rates are negative or a mod
     params.share(j) = -0.1;
     CHECK(ThreeModels(params).check() == Status::kBadParameter);
   }
+  for (const double sum : {0.998, 0.9995, 1.0005, 1.002}) {  // 1 to the digits of what is written
+    params.share << sum - 0.5, 0.3, 0.2;
+    CHECK(ThreeModels(params).check() ==
+          (std::fabs(sum - 1) < 0.001 ? Status::kOk : Status::kBadParameter));
+  }
   params.share << 0, 0.5, 0.5;
   CHECK(ThreeModels(params).check() == Status::kOk);
   for (const double bad : {-1.0, HUGE_VAL, std::nan("")}) {
@@ -154,6 +159,11 @@ TEST_CASE("models are refused where shares are none, rates are negative or a mod
   const ThreeModels imm{ThreeModels::Params(), auvest::ConstantVelocity<double>(),
                         auvest::ExactAcceleration<double>(), auvest::CoordinatedTurn<double>(turn)};
   CHECK(imm.check() == Status::kBadParameter);
+  auvest::ConstantVelocity<double>::Params straight;
+  straight.velocity = -1;
+  const ThreeModels first{ThreeModels::Params(), auvest::ConstantVelocity<double>(straight),
+                          auvest::ExactAcceleration<double>(), auvest::CoordinatedTurn<double>()};
+  CHECK(first.check() == Status::kBadParameter);
 }
 
 }  // namespace

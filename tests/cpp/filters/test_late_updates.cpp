@@ -142,6 +142,22 @@ TEST_CASE("late updates: where a later event cannot be repeated nothing changes,
   CHECK(late.filter().P() == other.filter().P());
 }
 
+TEST_CASE("late updates: half a step old is now; half a step before all is at their start") {
+  for (const float age : {0.5f, 1.5f}) {  // after and before the only step, of 1 s
+    Filter plain = slave();
+    Late<4> late(slave());
+    if (age > 1) REQUIRE(plain.update(range(1), leader(1)).status == Status::kOk);
+    REQUIRE(plain.predict(1, motion(1)) == Status::kOk);
+    REQUIRE(late.predict(1, motion(1)) == Status::kOk);
+    if (age < 1) REQUIRE(plain.update(range(1), leader(1)).status == Status::kOk);
+    REQUIRE(late.update(range(1), leader(1), age).status == Status::kOk);
+    CHECK(same(late.filter(), plain));
+  }
+  Late<4> late(slave());
+  REQUIRE(late.predict(1, motion(1)) == Status::kOk);
+  CHECK(late.update(range(1), leader(1), 1.51f).status == Status::kTimeBackwards);
+}
+
 TEST_CASE("late updates: what is refused changes nothing, then or later") {
   Late<8> late(slave()), other(slave());
   const auto check_refused = [&](const Z& z, float age, Status wanted) {

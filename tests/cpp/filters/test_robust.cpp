@@ -329,6 +329,29 @@ TEST_CASE("robust update: a change of weight within the tolerance is none") {
   CHECK(correction.iterations == 1);
 }
 
+TEST_CASE("robust update: weights that rise are followed as those that fall") {
+  // Two instruments see one state and disagree by 20 sigma. The plain update lies between them: the
+  // first looks nearly as bad as the second, which is rejected. Without the second it is good.
+  using Rule = auvest::RobustUpdate<auvest::Igg<double>>;
+  Rule::Params params;
+  params.residual = Residual::kPostFit;
+  auvest::Igg<double>::Params thresholds;
+  thresholds.k0 = 2;
+  thresholds.k1 = 10;
+  auto filter =
+      robust_ekf(Rule{auvest::Igg<double>(thresholds), auvest::NoRecovery<double>(), params});
+  Matrix<double, kM, kN> h;
+  h << 1, 0, 0, 1, 0, 0;
+  const Sensor both(h, Matrix<double, kM, kM>::Identity());
+  const auto correction = filter.update(Vector<double, kM>(0, 20), both);
+  REQUIRE(correction.status == Status::kOk);
+  CHECK(correction.weight(0) == 1);
+  CHECK(correction.weight(1) == 0);
+  CHECK(std::fabs(filter.x()(0)) < 1e-12);
+  const double p = prior()(0, 0);
+  CHECK(filter.P()(0, 0) == close_to(p / (p + 1), 1e-12));
+}
+
 TEST_CASE("robust update: the adaptive filter takes it, and only the kernel's side is changed") {
   using Acceleration = auvest::ExactAcceleration<double>;
   using Rule = auvest::RobustUpdate<auvest::Igg<double>, auvest::RejectionStreak<double>>;
@@ -400,10 +423,49 @@ TEST_CASE("robust update: refuses what the plain one refuses, and bad parameters
   bad = Rule();
   bad.params.max_iterations = 1;
   CHECK(reset_with(bad) == Status::kBadParameter);
+  bad.params.max_iterations = 2;
+  CHECK(reset_with(bad) == Status::kOk);
   bad = Rule();
   bad.params.tolerance = -1;
   CHECK(reset_with(bad) == Status::kBadParameter);
   CHECK(filter.restore(filter.belief(), bad) == Status::kBadParameter);
+
+  // Those of the filter inside are asked for, too.
+  auvest::Ukf<Process>::Params flat;
+  flat.alpha = 0;
+  const auvest::Robust<auvest::Ukf<Process>, Rule> inside(auvest::Ukf<Process>(still(), flat));
+  CHECK(inside.check() == Status::kBadParameter);
+}
+
+TEST_CASE("robust update: what was saved goes on with the same bits, whatever the rule before") {
+  using Rule = auvest::RobustUpdate<auvest::Igg<double>, auvest::RejectionStreak<double>>;
+  auto filter = robust_ekf(Rule());
+  const Vector<double, kM> far(30, -40);
+  REQUIRE(filter.update(far, sensor()).decision == Decision::kRejected);
+  REQUIRE(filter.rule().recovery.count > 0);
+  Rule bad;
+  bad.params.tolerance = -1;
+  auvest::Robust<auvest::Ekf<Process>, Rule> other(auvest::Ekf<Process>(still()), bad);
+  CHECK(other.check() == Status::kBadParameter);
+  CHECK(other.restore(filter.belief()) == Status::kBadParameter);  // with the rule that it has
+  CHECK_FALSE(other.initialised());
+  REQUIRE(other.restore(filter.belief(), filter.rule()) == Status::kOk);
+  CHECK(other.check() == Status::kOk);
+  for (int k = 0; k < 8; ++k) {
+    const auto a = filter.update(far, sensor());
+    const auto b = other.update(far, sensor());
+    CHECK(a.recovered == b.recovered);
+    CHECK(filter.rule().recovery.count == other.rule().recovery.count);
+    CHECK(same_bits(filter.x(), other.x()));
+    CHECK(same_bits(filter.P(), other.P()));
+  }
+  CHECK(other.reset(Vector<double, kN>::Zero(), prior()) == Status::kOk);
+  CHECK(other.rule().recovery.count == 0);
+  // A belief that is refused leaves the rule, too.
+  auto broken = filter.belief();
+  broken.x(0) = std::nan("");
+  CHECK(other.restore(broken, filter.rule()) == Status::kNotFinite);
+  CHECK(other.rule().recovery.count == 0);
 }
 
 }  // namespace

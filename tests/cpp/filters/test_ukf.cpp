@@ -12,6 +12,7 @@
 #include "auvest/math/random.hpp"
 #include "auvest/models/constant_acceleration.hpp"
 #include "auvest/models/range_bearing.hpp"
+#include "auvest/models/speed_heading.hpp"
 
 namespace {
 
@@ -106,6 +107,28 @@ TEST_CASE("UKF: a refused call leaves the belief as it was") {
   CHECK(same_belief(filter, before));
 }
 
+TEST_CASE("filters: an input is taken over by a prediction that is not refused, and only then") {
+  using Slave = auvest::Ekf<auvest::SpeedHeading<double>>;
+  using Input = Vector<double, 3>;
+  Slave filter{auvest::SpeedHeading<double>()};
+  const Input first(1, 0.5, 0.1);
+  const Input second(2, -0.5, 0.3);
+  CHECK(filter.predict(1, first) == Status::kNotInitialised);
+  CHECK(filter.process().input.isZero());
+  REQUIRE(filter.reset(Vector<double, 2>(0, 0), Matrix<double, 2, 2>::Identity()) == Status::kOk);
+  REQUIRE(filter.predict(1, first) == Status::kOk);
+  CHECK(filter.process().input == first);
+  CHECK(filter.predict(-1, second) == Status::kTimeBackwards);
+  CHECK(filter.predict(std::nan(""), second) == Status::kNotFinite);
+  CHECK(filter.predict(1, Input(1e308, 1e308, 0.7)) == Status::kOverflow);
+  CHECK(filter.predict(1, Input(1, std::nan(""), 0)) == Status::kNotFinite);
+  CHECK(filter.process().input == first);
+  const auto before = filter;
+  REQUIRE(filter.predict(0, second) == Status::kOk);  // no time passes: nothing moves
+  CHECK(same_belief(filter, before));
+  CHECK(filter.process().input == second);
+}
+
 TEST_CASE("UKF: without a belief nothing happens") {
   Tracker<double> filter{auvest::ExactAcceleration<double>()};
   CHECK(filter.predict(1) == Status::kNotInitialised);
@@ -129,6 +152,9 @@ TEST_CASE("UKF: parameters out of range are reported") {
   CHECK(status(1, 0.5, -3) == Status::kBadParameter);
   CHECK(status(1, 2, -6) == Status::kBadParameter);
   CHECK(status(1, 2, std::nan("")) == Status::kBadParameter);
+  CHECK(status(1, HUGE_VAL, -3) == Status::kBadParameter);
+  CHECK(status(1, 2, HUGE_VAL) == Status::kBadParameter);
+  CHECK(status(1, 1, -3) == Status::kOk);  // beta = alpha^2: no weight of the mean's square
 
   // reset refuses what check() refuses, in the process too.
   Tracker<double>::Params params;

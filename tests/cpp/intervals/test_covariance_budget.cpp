@@ -52,6 +52,21 @@ TEST_CASE("budget: out of reach gives T_min, never needed gives T_max") {
   CHECK(loose.interval() == 1);
 }
 
+TEST_CASE("budget: what T_max just reaches is within it") {
+  Process::Params quiet;
+  quiet.position = quiet.velocity = quiet.acceleration = 0;
+  Policy::Params params;
+  params.position_sigma_m = 0.5;
+  Budgeted filter{auvest::Ukf<Process>(Process(quiet)), Policy(params)};
+  // After 1 s P_xx = P_yy = 1/16 + 1/16, without rounding: together 0.5^2.
+  Matrix<double, 6, 6> P = Matrix<double, 6, 6>::Identity() / 16;
+  P(4, 4) = P(5, 5) = 1e-300;
+  REQUIRE(filter.reset(Vector<double, 6>::Zero(), P) == Status::kOk);
+  REQUIRE(predicted_sigma(filter, 1) == 0.5);
+  REQUIRE(filter.feedback(Vector<double, 2>::Zero()) == Status::kOk);
+  CHECK(filter.interval() == 1);
+}
+
 TEST_CASE("bad parameters are reported") {
   const auto changed = [](double Policy::Params::*member, double value) {
     Policy::Params params;
@@ -64,6 +79,7 @@ TEST_CASE("bad parameters are reported") {
   CHECK(changed(&P::position_sigma_m, std::nan("")) == Status::kBadParameter);
   CHECK(changed(&P::min_s, -1) == Status::kBadParameter);
   CHECK(changed(&P::initial_s, 2) == Status::kBadParameter);
+  CHECK(changed(&P::initial_s, 0.01) == Status::kBadParameter);  // below T_min
   CHECK(changed(&P::max_s, HUGE_VAL) == Status::kBadParameter);
 
   auvest::FixedInterval<double>::Params fixed;

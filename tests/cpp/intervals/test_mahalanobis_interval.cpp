@@ -104,6 +104,16 @@ TEST_CASE("Eqs. (7), (8), (12): one step by hand") {
   CHECK(law.memory.ratio == close_to(0.01 / 0.29, 1e-14));
   CHECK(t == close_to(0.5 * 0.1 * 0.5 + 0.5 * (0.01 / 0.29), 1e-14));
   CHECK(law.memory.tau == close_to(1.6 / (law.memory.mahalanobis_squared + 1), 1e-12));
+
+  // Restarted, it knows nothing of that step.
+  REQUIRE(law.memory.mahalanobis_squared > 0);
+  law.restart(Position(1, 2), Position(3, 4));
+  CHECK(law.memory.ratio == 0);
+  CHECK(law.memory.mahalanobis_squared == 0);
+  CHECK(law.memory.tau == params.tau0);
+  CHECK(law.memory.interval == params.initial_s);
+  CHECK(law.memory.last_estimate == Position(1, 2));
+  CHECK(law.memory.last_reference == Position(3, 4));
 }
 
 TEST_CASE("figure3: the steady interval is the fixed point at d^2 = 1.5, M = 0.9") {
@@ -186,6 +196,8 @@ TEST_CASE("bad parameters are reported") {
   CHECK(changed(&P::gamma2, -1) == Status::kBadParameter);
   CHECK(changed(&P::epsilon, 0) == Status::kBadParameter);
   CHECK(changed(&P::scale, 1.5) == Status::kBadParameter);
+  CHECK(changed(&P::scale, -0.1) == Status::kBadParameter);
+  for (const double scale : {0.0, 1.0}) CHECK(changed(&P::scale, scale) == Status::kOk);
   CHECK(changed(&P::ratio_max, 0) == Status::kBadParameter);
   CHECK(changed(&P::ratio_max, 1) == Status::kOk);
   CHECK(changed(&P::ratio_max, 1.1) == Status::kBadParameter);

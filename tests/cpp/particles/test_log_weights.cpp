@@ -74,6 +74,7 @@ TEST_CASE("normalise: one particle left, zero weights, not a number") {
 TEST_CASE("weight: no subnormal number, one at one") {
   CHECK(auvest::weight_of(0.0f) == 1.0f);
   CHECK(auvest::weight_of(-80.1f) == 0.0f);
+  CHECK(auvest::weight_of(-80.0f) == 0.0f);  // the edge itself is no weight
   CHECK(auvest::weight_of(-79.9f) > std::numeric_limits<float>::min());
   CHECK(auvest::weight_of(-std::numeric_limits<float>::infinity()) == 0.0f);
 }

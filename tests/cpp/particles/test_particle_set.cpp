@@ -35,6 +35,31 @@ TEST_CASE("particle set: every number of every particle has its own place, block
   for (int i = n; i < 48; ++i) CHECK(*set.at(i, 1) == 361);
 }
 
+TEST_CASE("particle set: a copy has the same particles, and a place of its own") {
+  const int n = 21;
+  std::vector<double> storage(Set::storage_size(40), -1.0);
+  std::vector<double> other(storage.size(), -2.0);
+  Set set(storage.data(), 40);
+  set.resize(n);
+  for (int i = 0; i < n; ++i) {
+    set.log_weights()[i] = -i;
+    for (int f = 0; f < 2; ++f) *set.at(i, f) = 10 * i + f;
+  }
+  Set copy(set, other.data());
+  CHECK(copy.size() == n);
+  CHECK(copy.capacity() == 40);
+  for (int i = 0; i < n; ++i) {
+    CHECK(copy.log_weights()[i] == -i);
+    for (int f = 0; f < 2; ++f) CHECK(*copy.at(i, f) == 10 * i + f);
+  }
+  *copy.at(3, 1) = 0;
+  copy.log_weight(3) = 0;
+  copy.resize(1);
+  CHECK(*set.at(3, 1) == 31);
+  CHECK(set.log_weight(3) == -3);
+  CHECK(set.size() == n);
+}
+
 TEST_CASE("ordered sum: the documented order, which is not the plain one") {
   const int n = 1000;
   std::vector<float> values;

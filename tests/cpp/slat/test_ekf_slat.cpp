@@ -376,4 +376,142 @@ TEST_CASE("outage: the filter has the masters that were shared last, no more") {
   }
 }
 
+TEST_CASE("EKF-SLAT: the NIS of several echoes at one time is their sum, each after those before") {
+  using Filter = auvest::EkfSlat<Compass<double>, Master<double>, 2>;
+  Filter together((Compass<double>()), Master<double>());
+  Random random(3);
+  Belief<double, 2> slave;
+  slave.x << 7, 8;
+  slave.P.setIdentity();
+  REQUIRE(together.reset(slave, random) == Status::kOk);
+  REQUIRE(together.add_master(master_belief<double>(100, 200)) == Status::kOk);
+  REQUIRE(together.add_master(master_belief<double>(-100, 50)) == Status::kOk);
+  const auvest::Sonar<double> sonar;
+  Echo<double> echoes[2];
+  for (int s = 0; s < 2; ++s) {
+    echoes[s].master = s;
+    echoes[s].z << 200 - 80 * s, -2.0 + 1.5 * s;
+  }
+  Filter apart = together;
+  double nis = 0;
+  for (const Echo<double>& echo : echoes) {
+    REQUIRE(apart.update(&echo, 1, sonar, random) == Status::kOk);
+    CHECK(apart.nis() > 0.1);
+    nis += apart.nis();
+  }
+  REQUIRE(together.update(echoes, 2, sonar, random) == Status::kOk);
+  CHECK(together.nis() == close_to(nis, 1e-14));
+  CHECK(together.log_likelihood() == close_to(apart.log_likelihood(), 1e-14));
+}
+
+TEST_CASE("SLAT filters: what is refused changes nothing; a reset begins anew") {
+  using Filter = auvest::EkfSlat<Compass<double>, Master<double>, 2>;
+  Filter filter((Compass<double>()), Master<double>());
+  Random random(4);
+  const auvest::Sonar<double> sonar;
+  const Vector<double, 2> u(5, 0.2);
+  Echo<double> seen;
+  seen.master = 0;
+  seen.z << 210, -2.0;
+  CHECK(filter.predict(1, u, random) == Status::kNotInitialised);
+  CHECK(filter.update(&seen, 1, sonar, random) == Status::kNotInitialised);
+  CHECK(filter.add_master(master_belief<double>(100, 200)) == Status::kNotInitialised);
+
+  Belief<double, 2> slave;
+  slave.x << 7, 8;
+  slave.P.setIdentity();
+  const auto begin = [&] {
+    REQUIRE(filter.reset(slave, random) == Status::kOk);
+    for (int m = 0; m < 2; ++m) {
+      REQUIRE(filter.add_master(master_belief<double>(100 - 200 * m, 200)) == Status::kOk);
+    }
+  };
+  begin();
+  REQUIRE(filter.predict(1, u, random) == Status::kOk);
+  REQUIRE(filter.update(&seen, 1, sonar, random) == Status::kOk);
+  const auto before = filter.belief();
+  const double log_likelihood = filter.log_likelihood();
+  const auto refused = [&](Status status, Status wanted) {
+    CHECK(status == wanted);
+    CHECK(filter.belief().x == before.x);
+    CHECK(filter.belief().P == before.P);
+    CHECK(filter.masters() == 2);
+    CHECK(filter.log_likelihood() == log_likelihood);
+  };
+  const double nan = std::nan("");
+  refused(filter.predict(nan, u, random), Status::kNotFinite);
+  refused(filter.predict(-0.5, u, random), Status::kTimeBackwards);
+  refused(filter.predict(1, Vector<double, 2>(5, nan), random), Status::kNotFinite);
+  Vector<double, 2> plan[2] = {{0, 0}, {0, nan}};
+  refused(filter.predict(1, u, random, plan), Status::kNotFinite);
+  refused(filter.add_master(master_belief<double>(0, 0)), Status::kBadParameter);  // the third
+  for (int i = 0; i < 2; ++i) {
+    Belief<double, 2> bad = slave;
+    bad.x(i) = nan;
+    refused(filter.reset(bad, random), Status::kNotFinite);
+    bad = slave;
+    bad.P(1, i) = nan;
+    refused(filter.reset(bad, random), Status::kNotFinite);
+    bad = slave;
+    bad.P(i, i) = -1e-3;
+    refused(filter.reset(bad, random), Status::kNotPositiveDefinite);
+  }
+  Echo<double> wrong = seen;
+  wrong.z(1) = nan;
+  refused(filter.update(&wrong, 1, sonar, random), Status::kNotFinite);
+
+  REQUIRE(filter.reset(slave, random) == Status::kOk);
+  CHECK(filter.masters() == 0);
+  CHECK(filter.log_likelihood() == 0);
+  auto master = master_belief<double>(100, 200);
+  master.P(1, 0) = 5;  // a correlation above 1
+  CHECK(filter.add_master(master) == Status::kNotPositiveDefinite);
+  master.P(1, 0) = nan;
+  CHECK(filter.add_master(master) == Status::kNotFinite);
+  CHECK(filter.masters() == 0);
+  begin();
+  REQUIRE(filter.predict(1, u, random) == Status::kOk);
+  REQUIRE(filter.update(&seen, 1, sonar, random) == Status::kOk);
+  CHECK(filter.belief().x == before.x);
+  CHECK(filter.log_likelihood() == log_likelihood);
+}
+
+TEST_CASE("dead reckoning: reads the lower triangle of P and gives both") {
+  auvest::DeadReckoning<Compass<double>> filter((Compass<double>()));
+  Random random(5);
+  Belief<double, 2> pose;
+  pose.x << 7, 8;
+  pose.P << 2, std::nan(""), 0.5, 1;
+  REQUIRE(filter.reset(pose, random) == Status::kOk);
+  CHECK(filter.slave().P(0, 1) == 0.5);
+  CHECK(filter.slave().P(1, 0) == 0.5);
+}
+
+TEST_CASE("outage: a shared state that is refused leaves the one before") {
+  using Filter = auvest::EkfSlat<Compass<double>, Master<double>, 2>;
+  auvest::Outage<Filter, 2> outage(Filter((Compass<double>()), Master<double>()));
+  Random random(6);
+  Belief<double, 2> slave;
+  slave.x << 7, 8;
+  slave.P.setIdentity();
+  Belief<double, 6> masters[2] = {master_belief<double>(100, 200), master_belief<double>(-100, 50)};
+  const Vector<double, 2> u(5, 0.2);
+  REQUIRE(outage.share(slave, masters, 1) == Status::kOk);
+  slave.x << 70, 80;
+  CHECK(outage.share(slave, masters, -1) == Status::kBadParameter);
+  CHECK(outage.share(slave, masters, 3) == Status::kBadParameter);
+  masters[1].x(5) = std::nan("");
+  CHECK(outage.share(slave, masters, 2) == Status::kNotFinite);
+  masters[1] = master_belief<double>(-100, 50);
+  masters[1].P(4, 2) = HUGE_VAL;
+  CHECK(outage.share(slave, masters, 2) == Status::kNotFinite);
+  CHECK(outage.slave().x == Vector<double, 2>(7, 8));
+  REQUIRE(outage.predict(1, u, random) == Status::kOk);
+  CHECK(outage.filter().masters() == 1);
+  // It goes on from there, and is not started again.
+  const auto position = outage.slave().x;
+  REQUIRE(outage.predict(1, u, random) == Status::kOk);
+  CHECK((outage.slave().x - position).norm() > 1);
+}
+
 }  // namespace

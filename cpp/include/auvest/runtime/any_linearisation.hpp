@@ -8,12 +8,21 @@
 #include "auvest/filters/ekf.hpp"
 #include "auvest/filters/ukf.hpp"
 
+/// Every kind once: X(name, the filter of that kind over a process). What runs every filter reads
+/// this.
+#define AUVEST_LINEARISATIONS(X) \
+  X(kEkf, Ekf)                   \
+  X(kUkf, Ukf)                   \
+  X(kCkf, Ckf)
+
 namespace auvest {
 
 template <class Scalar_>
 struct AnyLinearisation {
   using Scalar = Scalar_;
-  enum class Kind : std::uint8_t { kEkf, kUkf, kCkf };
+#define AUVEST_KIND(name, filter) name,
+  enum class Kind : std::uint8_t { AUVEST_LINEARISATIONS(AUVEST_KIND) };
+#undef AUVEST_KIND
 
   Kind kind;
   SigmaPoints<Scalar> unscented;
