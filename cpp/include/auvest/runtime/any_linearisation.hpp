@@ -9,6 +9,7 @@
 #include "auvest/filters/ukf.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 struct AnyLinearisation {
@@ -53,4 +54,5 @@ struct AnyLinearisation {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest
