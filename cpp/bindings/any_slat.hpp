@@ -2,169 +2,231 @@
 // behind one interface, so that records, scenarios and outages are compiled once per pose.
 #pragma once
 
+#include <cstring>
 #include <memory>
-#include <utility>
+#include <type_traits>
 #include <vector>
 
+#include "auvest/math/random.hpp"
 #include "auvest/slat/dead_reckoning.hpp"
 #include "auvest/slat/echo.hpp"
 #include "auvest/slat/ekf_slat.hpp"
 #include "auvest/slat/imm_slat.hpp"
+#include "slat_interface.hpp"
 #include "slat_state.hpp"
 
 namespace auvest {
-
-/// What can be read besides the beliefs. What a filter has not is zero.
-template <class Scalar>
-struct SlatReadings {
-  int masters = 0;
-  int particles = 0;
-  int resamplings = 0;
-  Scalar effective_size = Scalar(0);
-  Scalar log_likelihood = Scalar(0);
-  Scalar nis = Scalar(0);
-};
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_, int Pose>
 class AnySlat {
  public:
   using Scalar = Scalar_;
   static constexpr int kPose = Pose;
-  static constexpr int kMasters = 4;
+  static constexpr int kMasters = bindings::kMostMasters;
   using Control = Vector<Scalar, 2>;
   using SlaveBelief = Belief<Scalar, Pose>;
   using MasterBelief = Belief<Scalar, 6>;
   using VelocityChange = Vector<Scalar, 2>;
-  using Echo = auvest::Echo<Scalar>;
+  using Interface = bindings::SlatInterface<Scalar, Pose>;
 
-  struct Interface {
-    virtual ~Interface() = default;
-    virtual std::unique_ptr<Interface> clone() const = 0;
-    virtual Status reset(const SlaveBelief& pose, math::Random& random) = 0;
-    virtual Status add_master(const MasterBelief& belief) = 0;
-    virtual Status predict(Scalar dt, const Control& u, math::Random& random,
-                           const VelocityChange* changes) = 0;
-    virtual Status update(const Echo* echoes, int count, const Sonar<Scalar>& sonar,
-                          math::Random& random) = 0;
-    /// predict() and update(), both or, where one is refused, neither.
-    virtual Status step(Scalar dt, const Control& u, const VelocityChange* changes,
-                        const Echo* echoes, int count, const Sonar<Scalar>& sonar,
-                        math::Random& random) = 0;
-    virtual SlaveBelief slave() const = 0;
-    virtual MasterBelief master(int n) const = 0;
-    virtual SlatReadings<Scalar> readings() const = 0;
-    /// Of each model of master n's Imm; nothing where there is one model.
-    virtual std::vector<Scalar> mode_probabilities(int n) const = 0;
-    /// Weights (particles) and poses (particles x Pose); nothing where there are no particles.
-    virtual void particles(Scalar* weights, Scalar* poses) const = 0;
-    virtual SlatState<Scalar> state() const = 0;
-    /// False where it is not the state of such a filter. Then this one must not be used any more.
-    virtual bool restore(const SlatState<Scalar>& state) = 0;
-  };
-
-  explicit AnySlat(std::unique_ptr<Interface> filter) : filter_(std::move(filter)) {}
+  /// Takes over what was made.
+  explicit AnySlat(Interface* filter) : filter_(filter) {}
   AnySlat(const AnySlat& other) : filter_(other.filter_->clone()) {}
   AnySlat(AnySlat&&) = default;
   AnySlat& operator=(AnySlat&&) = default;
 
   Status reset(const SlaveBelief& pose, math::Random& random) {
-    return filter_->reset(pose, random);
+    return Status(filter_->reset(pose.x, pose.P, &random));
   }
-  Status add_master(const MasterBelief& belief) { return filter_->add_master(belief); }
+  Status add_master(const MasterBelief& belief) {
+    return Status(filter_->add_master(belief.x, belief.P));
+  }
   Status predict(Scalar dt, const Control& u, math::Random& random,
                  const VelocityChange* changes = nullptr) {
-    return filter_->predict(dt, u, random, changes);
+    return Status(filter_->predict(dt, u, changes, &random));
   }
-  Status update(const Echo* echoes, int count, const Sonar<Scalar>& sonar, math::Random& random) {
-    return filter_->update(echoes, count, sonar, random);
+  Status update(const Echo<Scalar>* echoes, int count, const Sonar<Scalar>& sonar,
+                math::Random& random) {
+    Heard heard;
+    if (!put(echoes, count, heard)) return Status::kBadParameter;
+    return Status(filter_->update(heard, &sonar, &random));
   }
-  Status step(Scalar dt, const Control& u, const VelocityChange* changes, const Echo* echoes,
-              int count, const Sonar<Scalar>& sonar, math::Random& random) {
-    return filter_->step(dt, u, changes, echoes, count, sonar, random);
+  Status step(Scalar dt, const Control& u, const VelocityChange* changes,
+              const Echo<Scalar>* echoes, int count, const Sonar<Scalar>& sonar,
+              math::Random& random) {
+    Heard heard;
+    if (!put(echoes, count, heard)) return Status::kBadParameter;
+    return Status(filter_->step(dt, u, changes, heard, &sonar, &random));
   }
-  SlaveBelief slave() const { return filter_->slave(); }
-  MasterBelief master(int n) const { return filter_->master(n); }
-  SlatReadings<Scalar> readings() const { return filter_->readings(); }
-  std::vector<Scalar> mode_probabilities(int n) const { return filter_->mode_probabilities(n); }
+  SlaveBelief slave() const {
+    SlaveBelief belief;
+    filter_->slave(belief.x, belief.P);
+    return belief;
+  }
+  MasterBelief master(int n) const {
+    MasterBelief belief;
+    filter_->master(n, belief.x, belief.P);
+    return belief;
+  }
+  bindings::SlatReadings<Scalar> readings() const {
+    bindings::SlatReadings<Scalar> readings = {};
+    filter_->read(readings);
+    return readings;
+  }
+  std::vector<Scalar> mode_probabilities(int n) const {
+    Scalar probabilities[bindings::kMostModes];
+    const int count = filter_->mode_probabilities(n, probabilities);
+    return std::vector<Scalar>(probabilities, probabilities + count);
+  }
   void particles(Scalar* weights, Scalar* poses) const { filter_->particles(weights, poses); }
-  SlatState<Scalar> state() const { return filter_->state(); }
-  /// False, with the filter as it was, where it is not the state of such a filter.
-  bool restore(const SlatState<Scalar>& state) {
-    std::unique_ptr<Interface> twin = filter_->clone();
-    if (!twin->restore(state)) return false;
-    filter_ = std::move(twin);
+  void save(bindings::SlatState<Scalar>& state) const { filter_->save(state); }
+  /// False where it is not the state of such a filter. Then this one must not be used any more.
+  bool restore(const bindings::SlatStateView<Scalar>& state) { return filter_->restore(state); }
+
+ private:
+  using Heard = bindings::SlatEchoes<Scalar>;
+
+  static bool put(const Echo<Scalar>* echoes, int count, Heard& heard) {
+    if (count < 0 || count > kMasters) return false;
+    for (int s = 0; s < count; ++s) {
+      heard.z[s] = echoes[s].z;
+      heard.master[s] = echoes[s].master;
+    }
+    heard.count = count;
     return true;
   }
 
- private:
   std::unique_ptr<Interface> filter_;
+};
+
+/// An object of auvest's whose bytes come from code that may have another name for its type.
+template <class Type>
+Type arrived(const void* bytes) {
+  static_assert(std::is_trivially_copyable<Type>::value, "its bytes are all that there is of it");
+  Type object;
+  std::memcpy(&object, bytes, sizeof object);
+  return object;
+}
+
+/// The caller's random generator, for one call.
+class Borrowed {
+ public:
+  explicit Borrowed(void* bytes) : random(0), bytes_(bytes) {
+    std::memcpy(&random, bytes, sizeof random);
+  }
+  ~Borrowed() { std::memcpy(bytes_, &random, sizeof random); }
+  Borrowed(const Borrowed&) = delete;
+
+  math::Random random;
+
+ private:
+  void* bytes_;
 };
 
 /// The probabilities of a filter's modes; nothing where its masters have no Imm.
 template <class Master, class Filter>
 struct ModeProbabilities {
-  static std::vector<typename Filter::Scalar> of(const Filter&, int) { return {}; }
+  using Scalar = typename Filter::Scalar;
+  static int of(const Filter&, int, Scalar (&)[bindings::kMostModes]) { return 0; }
 };
 
 template <class... Models, class Filter>
 struct ModeProbabilities<Imm<Models...>, Filter> {
-  static std::vector<typename Filter::Scalar> of(const Filter& filter, int n) {
-    std::vector<typename Filter::Scalar> result;
-    for (int k = 0; k < Imm<Models...>::kModes; ++k) {
-      result.push_back(filter.mode_probability(n, k));
-    }
-    return result;
+  using Scalar = typename Filter::Scalar;
+  static int of(const Filter& filter, int n, Scalar (&out)[bindings::kMostModes]) {
+    for (int k = 0; k < Imm<Models...>::kModes; ++k) out[k] = filter.mode_probability(n, k);
+    return Imm<Models...>::kModes;
   }
 };
 
 /// What the models of the interface have in common: calls handed on to `filter_`.
 template <class Filter>
-class SlatModel : public AnySlat<typename Filter::Scalar, Filter::kPose>::Interface {
+class SlatModel : public bindings::SlatInterface<typename Filter::Scalar, Filter::kPose> {
  public:
   using Scalar = typename Filter::Scalar;
-  using Any = AnySlat<Scalar, Filter::kPose>;
+  using Interface = bindings::SlatInterface<Scalar, Filter::kPose>;
+  using Pair = Vector<Scalar, 2>;
+  using Heard = bindings::SlatEchoes<Scalar>;
+  using Pose = Vector<Scalar, Filter::kPose>;
+  using PoseCovariance = Matrix<Scalar, Filter::kPose, Filter::kPose>;
 
-  Status reset(const typename Any::SlaveBelief& pose, math::Random& random) override {
-    return filter_.reset(pose, random);
+  std::uint8_t reset(const Pose& x, const PoseCovariance& P, void* random) override {
+    Borrowed caller(random);
+    return code(filter_.reset({x, P}, caller.random));
   }
-  Status add_master(const typename Any::MasterBelief& belief) override {
-    return filter_.add_master(belief);
+  std::uint8_t add_master(const Vector<Scalar, 6>& x, const Matrix<Scalar, 6, 6>& P) override {
+    return code(filter_.add_master({x, P}));
   }
-  Status predict(Scalar dt, const typename Any::Control& u, math::Random& random,
-                 const typename Any::VelocityChange* changes) override {
-    return filter_.predict(dt, u, random, changes);
+  std::uint8_t predict(Scalar dt, const Pair& u, const Pair* changes, void* random) override {
+    Borrowed caller(random);
+    return code(filter_.predict(dt, u, caller.random, changes));
   }
-  Status update(const typename Any::Echo* echoes, int count, const Sonar<Scalar>& sonar,
-                math::Random& random) override {
-    return filter_.update(echoes, count, sonar, random);
+  std::uint8_t update(const Heard& heard, const void* sonar, void* random) override {
+    Borrowed caller(random);
+    const Echoes echoes(heard);
+    return code(
+        filter_.update(echoes.echo, heard.count, arrived<Sonar<Scalar>>(sonar), caller.random));
   }
-  typename Any::SlaveBelief slave() const override { return filter_.slave(); }
-  SlatState<Scalar> state() const override {
-    StateKeeper<Scalar> keeper;
+  void slave(Pose& x, PoseCovariance& P) const override {
+    const auto belief = filter_.slave();
+    x = belief.x;
+    P = belief.P;
+  }
+  void save(bindings::SlatState<Scalar>& state) const override {
+    StateKeeper<Scalar> keeper(state);
     Filter::visit_state(filter_, keeper);
-    return keeper.state;
   }
-  bool restore(const SlatState<Scalar>& state) override {
+  bool restore(const bindings::SlatStateView<Scalar>& state) override {
     StateReturner<Scalar> returner(state);
     Filter::visit_state(filter_, returner);
     return returner.complete();
   }
 
  protected:
+  struct Echoes {
+    explicit Echoes(const Heard& heard) {
+      for (int s = 0; s < heard.count; ++s) {
+        echo[s].z = heard.z[s];
+        echo[s].master = heard.master[s];
+      }
+    }
+
+    Echo<Scalar> echo[bindings::kMostMasters];
+  };
+
   template <class... Arguments>
   explicit SlatModel(Arguments&&... arguments) : filter_(std::forward<Arguments>(arguments)...) {}
+
+  static std::uint8_t code(Status status) { return static_cast<std::uint8_t>(status); }
 
   Filter filter_;
 };
 
+/// What the particles stand in.
+template <class Scalar>
+class Numbers {
+ public:
+  explicit Numbers(std::size_t count) : numbers_(new Scalar[count]()) {}
+  ~Numbers() { delete[] numbers_; }
+  Numbers(const Numbers&) = delete;
+
+  Scalar* data() const { return numbers_; }
+
+ private:
+  Scalar* numbers_;
+};
+
 /// Slatf or SlatfJoint with particles of its own.
 template <class Filter>
-class SlatfModel : private std::vector<typename Filter::Scalar>, public SlatModel<Filter> {
+class SlatfModel final : private Numbers<typename Filter::Scalar>, public SlatModel<Filter> {
  public:
   using Base = SlatModel<Filter>;
-  using typename Base::Any;
+  using typename Base::Heard;
+  using typename Base::Interface;
+  using typename Base::Pair;
   using typename Base::Scalar;
-  using Storage = std::vector<Scalar>;
+  using Storage = Numbers<Scalar>;
 
   template <class Setup>
   explicit SlatfModel(const Setup& setup)
@@ -172,30 +234,33 @@ class SlatfModel : private std::vector<typename Filter::Scalar>, public SlatMode
         Base(setup.motion, setup.master, setup.params, Storage::data(), setup.particles,
              setup.resampling) {}
   SlatfModel(const SlatfModel& other)
-      : Storage(other.size()), Base(other.filter_, Storage::data()) {}
+      : Storage(Filter::Set::storage_size(other.filter_.set().capacity())),
+        Base(other.filter_, Storage::data()) {}
 
-  std::unique_ptr<typename Any::Interface> clone() const override {
-    return std::unique_ptr<typename Any::Interface>(new SlatfModel(*this));
+  Interface* clone() const override { return new SlatfModel(*this); }
+  std::uint8_t step(Scalar dt, const Pair& u, const Pair* changes, const Heard& heard,
+                    const void* sonar, void* random) override {
+    Borrowed caller(random);
+    const typename Base::Echoes echoes(heard);
+    return this->code(this->filter_.step(dt, u, changes, echoes.echo, heard.count,
+                                         arrived<Sonar<Scalar>>(sonar), caller.random));
   }
-  Status step(Scalar dt, const typename Any::Control& u,
-              const typename Any::VelocityChange* changes, const typename Any::Echo* echoes,
-              int count, const Sonar<Scalar>& sonar, math::Random& random) override {
-    return this->filter_.step(dt, u, changes, echoes, count, sonar, random);
+  void master(int n, Vector<Scalar, 6>& x, Matrix<Scalar, 6, 6>& P) const override {
+    const auto belief = this->filter_.master(n);
+    x = belief.x;
+    P = belief.P;
   }
-  typename Any::MasterBelief master(int n) const override { return this->filter_.master(n); }
-  std::vector<Scalar> mode_probabilities(int n) const override {
-    return ModeProbabilities<typename Filter::Master, Filter>::of(this->filter_, n);
+  int mode_probabilities(int n, Scalar (&out)[bindings::kMostModes]) const override {
+    return ModeProbabilities<typename Filter::Master, Filter>::of(this->filter_, n, out);
   }
 
-  SlatReadings<Scalar> readings() const override {
+  void read(bindings::SlatReadings<Scalar>& readings) const override {
     const Filter& filter = this->filter_;
-    SlatReadings<Scalar> readings;
     readings.masters = filter.masters();
     readings.particles = filter.particles();
     readings.resamplings = filter.resamplings();
     readings.effective_size = filter.effective_size();
     readings.log_likelihood = filter.log_likelihood();
-    return readings;
   }
 
   void particles(Scalar* weights, Scalar* poses) const override {
@@ -211,64 +276,67 @@ class SlatfModel : private std::vector<typename Filter::Scalar>, public SlatMode
 
 /// EkfSlat or DeadReckoning.
 template <class Filter>
-class GaussianSlatModel : public SlatModel<Filter> {
+class GaussianSlatModel final : public SlatModel<Filter> {
  public:
   using Base = SlatModel<Filter>;
-  using typename Base::Any;
+  using typename Base::Heard;
+  using typename Base::Interface;
+  using typename Base::Pair;
   using typename Base::Scalar;
 
   explicit GaussianSlatModel(const Filter& filter) : Base(filter) {}
   GaussianSlatModel(const GaussianSlatModel& other) : Base(other.filter_) {}
 
-  std::unique_ptr<typename Any::Interface> clone() const override {
-    return std::unique_ptr<typename Any::Interface>(new GaussianSlatModel(*this));
-  }
-  Status step(Scalar dt, const typename Any::Control& u,
-              const typename Any::VelocityChange* changes, const typename Any::Echo* echoes,
-              int count, const Sonar<Scalar>& sonar, math::Random& random) override {
+  Interface* clone() const override { return new GaussianSlatModel(*this); }
+  std::uint8_t step(Scalar dt, const Pair& u, const Pair* changes, const Heard& heard,
+                    const void* sonar, void* random) override {
     const Filter before = this->filter_;
-    Status status = this->filter_.predict(dt, u, random, changes);
-    if (status == Status::kOk) status = this->filter_.update(echoes, count, sonar, random);
-    if (status != Status::kOk) this->filter_ = before;
+    std::uint8_t status = this->predict(dt, u, changes, random);
+    if (status == this->code(Status::kOk)) status = this->update(heard, sonar, random);
+    if (status != this->code(Status::kOk)) this->filter_ = before;
     return status;
   }
-  typename Any::MasterBelief master(int n) const override { return master_of(this->filter_, n); }
-  SlatReadings<Scalar> readings() const override { return readings_of(this->filter_); }
-  std::vector<Scalar> mode_probabilities(int n) const override {
-    return modes_of(this->filter_, n);
+  void master(int n, Vector<Scalar, 6>& x, Matrix<Scalar, 6, 6>& P) const override {
+    const Belief<Scalar, 6> belief = master_of(this->filter_, n);
+    x = belief.x;
+    P = belief.P;
+  }
+  int mode_probabilities(int n, Scalar (&out)[bindings::kMostModes]) const override {
+    return modes_of(this->filter_, n, out);
+  }
+  void read(bindings::SlatReadings<Scalar>& readings) const override {
+    read(this->filter_, readings);
   }
   void particles(Scalar*, Scalar*) const override {}
 
  private:
   template <class Motion>
-  static typename Any::MasterBelief master_of(const DeadReckoning<Motion>&, int) {
-    return typename Any::MasterBelief();
+  static Belief<Scalar, 6> master_of(const DeadReckoning<Motion>&, int) {
+    return Belief<Scalar, 6>();
   }
   template <class Motion, class Master, int Masters>
-  static typename Any::MasterBelief master_of(const EkfSlat<Motion, Master, Masters>& filter,
-                                              int n) {
+  static Belief<Scalar, 6> master_of(const EkfSlat<Motion, Master, Masters>& filter, int n) {
     return filter.master(n);
   }
   template <class Motion>
-  static std::vector<Scalar> modes_of(const DeadReckoning<Motion>&, int) {
-    return {};
+  static int modes_of(const DeadReckoning<Motion>&, int, Scalar (&)[bindings::kMostModes]) {
+    return 0;
   }
   template <class Motion, class Master, int Masters>
-  static std::vector<Scalar> modes_of(const EkfSlat<Motion, Master, Masters>& filter, int n) {
-    return ModeProbabilities<Master, EkfSlat<Motion, Master, Masters>>::of(filter, n);
+  static int modes_of(const EkfSlat<Motion, Master, Masters>& filter, int n,
+                      Scalar (&out)[bindings::kMostModes]) {
+    return ModeProbabilities<Master, EkfSlat<Motion, Master, Masters>>::of(filter, n, out);
   }
   template <class Motion>
-  static SlatReadings<Scalar> readings_of(const DeadReckoning<Motion>&) {
-    return SlatReadings<Scalar>();
-  }
+  static void read(const DeadReckoning<Motion>&, bindings::SlatReadings<Scalar>&) {}
   template <class Motion, class Master, int Masters>
-  static SlatReadings<Scalar> readings_of(const EkfSlat<Motion, Master, Masters>& filter) {
-    SlatReadings<Scalar> readings;
+  static void read(const EkfSlat<Motion, Master, Masters>& filter,
+                   bindings::SlatReadings<Scalar>& readings) {
     readings.masters = filter.masters();
     readings.log_likelihood = filter.log_likelihood();
     readings.nis = filter.nis();
-    return readings;
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -32,6 +32,13 @@ void bind_sonar(py::module_& m) {
 
 }  // namespace
 
+template <class Scalar, int Pose>
+SlatInterface<Scalar, Pose>::~SlatInterface() = default;
+template struct SlatInterface<float, 2>;
+template struct SlatInterface<float, 3>;
+template struct SlatInterface<double, 2>;
+template struct SlatInterface<double, 3>;
+
 std::vector<std::string> instruction_sets(bool single_precision) {
   std::vector<std::string> sets{"scalar"};
 #if AUVEST_VECTOR_LANES

@@ -1,11 +1,24 @@
-# No instruction of AVX or later outside the code for it: see wide_instructions.awk.
-execute_process(
-  COMMAND ${OBJDUMP} --disassemble --no-show-raw-insn --section=.text ${MODULE}
-  COMMAND ${AWK} -f ${SCRIPT}
-  OUTPUT_VARIABLE functions RESULTS_VARIABLE results ERROR_VARIABLE errors)
-if(NOT results STREQUAL "0;0")
-  message(FATAL_ERROR "cannot disassemble ${MODULE}: ${errors}")
-endif()
-if(functions)
-  message(FATAL_ERROR "AVX instructions where any processor may come, in:\n${functions}")
+# Of functions that are compiled in several files (weak: inline ones and templates) the linker keeps
+# one. So all of those in wide_<set>.cpp must have the set in their names: auvest's and xsimd's have,
+# the standard library's and Eigen's have not and must be inlined, or not be used there.
+foreach(object IN LISTS OBJECTS)
+  if(NOT object MATCHES "/wide_([a-z0-9]+)\\.cpp[^/]*$")
+    continue()
+  endif()
+  set(set ${CMAKE_MATCH_1})
+  execute_process(COMMAND ${NM} --defined-only --format=posix ${object}
+                  OUTPUT_VARIABLE symbols RESULT_VARIABLE result)
+  string(REGEX MATCHALL "[^\n]+ W " functions "${symbols}")
+  if(NOT result EQUAL 0 OR NOT functions)
+    message(FATAL_ERROR "cannot read the names in ${object}")
+  endif()
+  list(FILTER functions EXCLUDE REGEX ${set})
+  if(functions)
+    string(REPLACE ";" "\n" functions "${functions}")
+    message(FATAL_ERROR "functions for ${set} that may be taken for every processor's:\n${functions}")
+  endif()
+  list(APPEND checked ${set})
+endforeach()
+if(NOT checked)
+  message(FATAL_ERROR "no object of wide_<set>.cpp among ${OBJECTS}")
 endif()

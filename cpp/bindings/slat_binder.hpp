@@ -63,18 +63,10 @@ class SlatBinder {
             "dead_reckoning",
             [](const py::dict& motion_params) {
               using Reckoning = DeadReckoning<Motion>;
-              return Any(
-                  pointer<GaussianSlatModel<Reckoning>>(Reckoning(model<Motion>(motion_params))));
+              return Any(new GaussianSlatModel<Reckoning>(Reckoning(model<Motion>(motion_params))));
             },
             py::arg("motion"))
         .def("copy", [](const Any& f) { return Any(f); })
-        .def("save", [](const Any& f) { return to_arrays(f.state()); })
-        .def(
-            "restore",
-            [](Any& f, const Array<Scalar>& numbers, const Integers& counts) {
-              if (!f.restore(to_state(numbers, counts))) refuse_state();
-            },
-            py::arg("numbers").noconvert(), py::arg("counts").noconvert())
         .def(
             "reset",
             [](Any& f, const Array<Scalar>& x, const Array<Scalar>& p, math::Random& random) {
@@ -94,27 +86,11 @@ class SlatBinder {
         .def("simulate", &simulate, py::arg("sonar"), py::arg("scenario"), py::arg("seed"),
              py::arg("first_run"), py::arg("runs"));
     bind_steps(filter);
+    bind_state(filter);
 
     py::class_<Switch> outage(m, named<Scalar>("SlatOutage_" + motion).c_str());
     outage.def(py::init([](const Any& f) { return Switch(f); }), py::arg("prototype"))
         .def("copy", [](const Switch& f) { return Switch(f); })
-        .def("save",
-             [](const Switch& f) {
-               StateKeeper<Scalar> keeper;
-               Switch::visit_state(f, keeper);
-               return to_arrays(keeper.state);
-             })
-        .def(
-            "restore",
-            [](Switch& f, const Array<Scalar>& numbers, const Integers& counts) {
-              const SlatState<Scalar> state = to_state(numbers, counts);
-              StateReturner<Scalar> returner(state);
-              Switch twin(f);
-              Switch::visit_state(twin, returner);
-              if (!returner.complete()) refuse_state();
-              f = std::move(twin);
-            },
-            py::arg("numbers").noconvert(), py::arg("counts").noconvert())
         .def("share", &share, py::arg("x").noconvert(), py::arg("P").noconvert(),
              py::arg("masters_x").noconvert(), py::arg("masters_P").noconvert())
         .def_property_readonly("communication", [](const Switch& f) {
@@ -124,6 +100,7 @@ class SlatBinder {
                                                 : "never";
         });
     bind_steps(outage);
+    bind_state(outage);
   }
 
  private:
@@ -176,26 +153,47 @@ class SlatBinder {
             py::arg("n"));
   }
 
-  static py::dict to_arrays(const SlatState<Scalar>& state) {
-    py::dict result;
-    result["numbers"] =
-        py::array_t<Scalar>(static_cast<py::ssize_t>(state.numbers.size()), state.numbers.data());
-    result["counts"] = py::array_t<std::int64_t>(static_cast<py::ssize_t>(state.counts.size()),
-                                                 state.counts.data());
-    return result;
+  template <class Filter>
+  static void bind_state(py::class_<Filter>& c) {
+    c.def("save",
+          [](const Filter& f) {
+            SlatState<Scalar> state = {};
+            save(f, state);  // counts them
+            py::array_t<Scalar> numbers(static_cast<py::ssize_t>(state.number_count));
+            py::array_t<std::int64_t> counts(static_cast<py::ssize_t>(state.count_count));
+            state.numbers = numbers.mutable_data();
+            state.counts = counts.mutable_data();
+            save(f, state);
+            py::dict result;
+            result["numbers"] = numbers;
+            result["counts"] = counts;
+            return result;
+          })
+        .def(
+            "restore",
+            [](Filter& f, const Array<Scalar>& numbers, const Integers& counts) {
+              require_shape(numbers, {-1}, "numbers");
+              require_shape(counts, {-1}, "counts");
+              StateReturner<Scalar> returner(
+                  {numbers.data(), static_cast<std::size_t>(numbers.size()), counts.data(),
+                   static_cast<std::size_t>(counts.size())});
+              Filter twin(f);
+              restore(twin, returner);
+              if (!returner.complete()) {
+                throw py::value_error("numbers and counts are not the state of such a filter");
+              }
+              f = std::move(twin);
+            },
+            py::arg("numbers").noconvert(), py::arg("counts").noconvert());
   }
-
-  static SlatState<Scalar> to_state(const Array<Scalar>& numbers, const Integers& counts) {
-    require_shape(numbers, {-1}, "numbers");
-    require_shape(counts, {-1}, "counts");
-    SlatState<Scalar> state;
-    state.numbers.assign(numbers.data(), numbers.data() + numbers.size());
-    state.counts.assign(counts.data(), counts.data() + counts.size());
-    return state;
+  static void save(const Any& filter, SlatState<Scalar>& state) { filter.save(state); }
+  static void save(const Switch& outage, SlatState<Scalar>& state) {
+    StateKeeper<Scalar> keeper(state);
+    Switch::visit_state(outage, keeper);
   }
-
-  [[noreturn]] static void refuse_state() {
-    throw py::value_error("numbers and counts are not the state of such a filter");
+  static void restore(Any& filter, StateReturner<Scalar>& returner) { returner(filter); }
+  static void restore(Switch& outage, StateReturner<Scalar>& returner) {
+    Switch::visit_state(outage, returner);
   }
 
   template <class Model>
@@ -203,11 +201,6 @@ class SlatBinder {
     const Model result(from_dict<typename Model::Params>(params));
     require_ok(result.check());
     return result;
-  }
-
-  template <class Model, class Filter>
-  static std::unique_ptr<typename Any::Interface> pointer(const Filter& filter) {
-    return std::unique_ptr<typename Any::Interface>(new Model(filter));
   }
 
   template <int N>
@@ -337,8 +330,7 @@ class SlatBinder {
         from_dict<typename EkfSlatOf<Motion>::Params>(values);
     typename Ekf::Params params;
     params.gate = given.gate;
-    return Any(std::unique_ptr<typename Any::Interface>(
-        new GaussianSlatModel<Ekf>(Ekf(motion, master, params))));
+    return Any(new GaussianSlatModel<Ekf>(Ekf(motion, master, params)));
   }
 
   static Any slatf(const py::dict& motion, const py::dict& master, const py::dict& params,
@@ -371,8 +363,8 @@ class SlatBinder {
 #if AUVEST_VECTOR_LANES
     if constexpr (std::is_same<Scalar, float>::value && std::is_same<Landmark, Master>::value) {
       if (lanes == "sse2") return Any(make_slatf<InstructionSet::kSse2>(setup));
-      if (lanes == "avx2") return Any(make_slatf<InstructionSet::kAvx2>(setup));
-      if (lanes == "avx512") return Any(make_slatf<InstructionSet::kAvx512>(setup));
+      if (lanes == "avx2") return Any(make_wide_slatf<InstructionSet::kAvx2, kPose>(&setup));
+      if (lanes == "avx512") return Any(make_wide_slatf<InstructionSet::kAvx512, kPose>(&setup));
     }
 #endif
     return Any(make_slatf<InstructionSet::kScalar>(setup));

@@ -5,31 +5,31 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <vector>
 
 #include "auvest/particles/log_weights.hpp"
 #include "auvest/particles/particle_set.hpp"
 #include "auvest/types.hpp"
+#include "slat_interface.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar, int Pose>
 class AnySlat;
 
-/// In the order in which the filter visits them. Of particles the weights come first, then all
-/// fields of one after the other: the same for all lanes.
-template <class Scalar>
-struct SlatState {
-  std::vector<Scalar> numbers;
-  std::vector<std::int64_t> counts;
-};
-
+/// Counts the numbers, and keeps them where there is an array for them.
 template <class Scalar>
 class StateKeeper {
  public:
-  SlatState<Scalar> state;
+  explicit StateKeeper(bindings::SlatState<Scalar>& state) : state_(state) {
+    state.number_count = 0;
+    state.count_count = 0;
+  }
 
-  void operator()(const Scalar& number) { state.numbers.push_back(number); }
+  void operator()(const Scalar& number) {
+    if (state_.numbers != nullptr) state_.numbers[state_.number_count] = number;
+    ++state_.number_count;
+  }
   template <int Rows, int Cols>
   void operator()(const Matrix<Scalar, Rows, Cols>& matrix) {
     for (int i = 0; i < Rows; ++i) {
@@ -44,8 +44,6 @@ class StateKeeper {
   template <int Fields>
   void operator()(const ParticleSet<Scalar, Fields>& set) {
     count(set.size());
-    const std::size_t more = static_cast<std::size_t>(set.size()) * (1 + Fields);
-    state.numbers.reserve(state.numbers.size() + more);
     for (int i = 0; i < set.size(); ++i) (*this)(set.log_weights()[i]);
     for (int i = 0; i < set.size(); ++i) {
       for (int field = 0; field < Fields; ++field) (*this)(*set.at(i, field));
@@ -53,14 +51,25 @@ class StateKeeper {
   }
   template <int Pose>
   void operator()(const AnySlat<Scalar, Pose>& filter) {
-    const SlatState<Scalar> inner = filter.state();
-    state.numbers.insert(state.numbers.end(), inner.numbers.begin(), inner.numbers.end());
-    state.counts.insert(state.counts.end(), inner.counts.begin(), inner.counts.end());
+    bindings::SlatState<Scalar> inner = {};
+    if (state_.numbers != nullptr) {
+      inner.numbers = state_.numbers + state_.number_count;
+      inner.counts = state_.counts + state_.count_count;
+    }
+    filter.save(inner);
+    state_.number_count += inner.number_count;
+    state_.count_count += inner.count_count;
   }
   template <class Count>
   void count(Count value, Count = Count()) {
-    state.counts.push_back(static_cast<std::int64_t>(value));
+    if (state_.counts != nullptr) {
+      state_.counts[state_.count_count] = static_cast<std::int64_t>(value);
+    }
+    ++state_.count_count;
   }
+
+ private:
+  bindings::SlatState<Scalar>& state_;
 };
 
 /// Puts back what a StateKeeper kept. Where complete() is false, the numbers were not those of such
@@ -68,14 +77,14 @@ class StateKeeper {
 template <class Scalar>
 class StateReturner {
  public:
-  explicit StateReturner(const SlatState<Scalar>& state) : state_(state) {}
+  explicit StateReturner(const bindings::SlatStateView<Scalar>& state) : state_(state) {}
 
   bool complete() const {
-    return fits_ && number_ == state_.numbers.size() && count_ == state_.counts.size();
+    return fits_ && number_ == state_.number_count && count_ == state_.count_count;
   }
 
   void operator()(Scalar& number) {
-    fits_ = fits_ && number_ < state_.numbers.size();
+    fits_ = fits_ && number_ < state_.number_count;
     if (fits_) number = state_.numbers[number_++];
   }
   template <int Rows, int Cols>
@@ -106,29 +115,26 @@ class StateReturner {
   template <int Pose>
   void operator()(AnySlat<Scalar, Pose>& filter) {
     if (!fits_) return;
-    SlatState<Scalar> inner;
-    inner.numbers.assign(state_.numbers.begin() + static_cast<std::ptrdiff_t>(number_),
-                         state_.numbers.end());
-    inner.counts.assign(state_.counts.begin() + static_cast<std::ptrdiff_t>(count_),
-                        state_.counts.end());
-    fits_ = filter.restore(inner);
-    number_ = state_.numbers.size();
-    count_ = state_.counts.size();
+    fits_ = filter.restore({state_.numbers + number_, state_.number_count - number_,
+                            state_.counts + count_, state_.count_count - count_});
+    number_ = state_.number_count;
+    count_ = state_.count_count;
   }
   /// 0..last
   template <class Count>
   void count(Count& value, Count last) {
-    fits_ = fits_ && count_ < state_.counts.size() && state_.counts[count_] >= 0 &&
+    fits_ = fits_ && count_ < state_.count_count && state_.counts[count_] >= 0 &&
             state_.counts[count_] <= static_cast<std::int64_t>(last);
     if (fits_) value = static_cast<Count>(state_.counts[count_++]);
   }
   void count(int& value) { count(value, std::numeric_limits<int>::max()); }
 
  private:
-  const SlatState<Scalar>& state_;
+  const bindings::SlatStateView<Scalar> state_;
   std::size_t number_ = 0;
   std::size_t count_ = 0;
   bool fits_ = true;
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

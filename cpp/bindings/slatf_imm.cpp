@@ -2,24 +2,25 @@
 #include "slatf_lanes.hpp"
 
 namespace auvest {
-namespace bindings {
+inline namespace AUVEST_INSTRUCTIONS {
+
+constexpr auto kSet = bindings::InstructionSet::kScalar;
 
 template <class Scalar>
-struct LanesOf<InstructionSet::kScalar, Scalar> {
+struct LanesOf<kSet, Scalar> {
   using Type = OneLane<Scalar>;
 };
 
 template <class Motion>
-using ImmSetup = SlatfSetup<Motion, ThreeModels<typename Motion::Scalar>>;
+using Setup = SlatfSetup<Motion, ThreeModels<typename Motion::Scalar>>;
 
-constexpr InstructionSet kSet = InstructionSet::kScalar;
-template SlatfPointer<CompassMotion<float>> make_slatf<kSet>(const ImmSetup<CompassMotion<float>>&);
-template SlatfPointer<UnicycleMotion<float>> make_slatf<kSet>(
-    const ImmSetup<UnicycleMotion<float>>&);
-template SlatfPointer<CompassMotion<double>> make_slatf<kSet>(
-    const ImmSetup<CompassMotion<double>>&);
-template SlatfPointer<UnicycleMotion<double>> make_slatf<kSet>(
-    const ImmSetup<UnicycleMotion<double>>&);
+template SlatfInterface<CompassMotion<float>>* make_slatf<kSet>(const Setup<CompassMotion<float>>&);
+template SlatfInterface<UnicycleMotion<float>>* make_slatf<kSet>(
+    const Setup<UnicycleMotion<float>>&);
+template SlatfInterface<CompassMotion<double>>* make_slatf<kSet>(
+    const Setup<CompassMotion<double>>&);
+template SlatfInterface<UnicycleMotion<double>>* make_slatf<kSet>(
+    const Setup<UnicycleMotion<double>>&);
 
-}  // namespace bindings
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -1,29 +1,30 @@
-// make_slatf() for the file of one instruction set, which is compiled with the flags of that set,
-// says LanesOf and instantiates make_slatf().
-//
-// Inline functions that do not carry the instruction set in their types are compiled in each of
-// these files too, and the linker keeps the first it meets: files for the baseline must come before
-// those for more (see CMakeLists.txt, which checks the module).
+// make_slatf() for a file that says LanesOf and instantiates it, and for wide_<set>.cpp what takes
+// its place there.
 #pragma once
 
 #include "slatf_setup.hpp"
 
 namespace auvest {
-namespace bindings {
+inline namespace AUVEST_INSTRUCTIONS {
 
-template <InstructionSet set, class Scalar>
+template <bindings::InstructionSet set, class Scalar>
 struct LanesOf;  // ::Type
 
-template <InstructionSet set, class Motion, class Master>
-SlatfPointer<Motion> make_slatf(const SlatfSetup<Motion, Master>& setup) {
-  using Scalar = typename Motion::Scalar;
-  using Lanes = typename LanesOf<set, Scalar>::Type;
-  constexpr int kMasters = AnySlat<Scalar, Motion::kStates>::kMasters;
+template <class Lanes, class Setup>
+SlatfInterface<typename Setup::Motion>* slatf_in(const Setup& setup) {
+  using Motion = typename Setup::Motion;
+  using Master = typename Setup::Master;
+  constexpr int kMasters = bindings::kMostMasters;
   using First = Slatf1<Motion, Master, kMasters, AnyResampling, Lanes>;
   using Second = Slatf2<Motion, Master, kMasters, AnyResampling, Lanes>;
-  if (setup.version == 1) return SlatfPointer<Motion>(new SlatfModel<First>(setup));
-  return SlatfPointer<Motion>(new SlatfModel<Second>(setup));
+  if (setup.version == 1) return new SlatfModel<First>(setup);
+  return new SlatfModel<Second>(setup);
 }
 
-}  // namespace bindings
+template <bindings::InstructionSet set, class Motion, class Master>
+SlatfInterface<Motion>* make_slatf(const SlatfSetup<Motion, Master>& setup) {
+  return slatf_in<typename LanesOf<set, typename Motion::Scalar>::Type>(setup);
+}
+
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -2,8 +2,6 @@
 // can run.
 #pragma once
 
-#include <memory>
-
 #include "any_slat.hpp"
 #include "auvest/models/constant_velocity.hpp"
 #include "auvest/models/coordinated_turn.hpp"
@@ -22,9 +20,7 @@
 #endif
 
 namespace auvest {
-namespace bindings {
-
-enum class InstructionSet : std::uint8_t { kScalar, kSse2, kAvx2, kAvx512 };
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// Masters that EkfSlat with an Imm takes here: 3 to their power hypotheses.
 constexpr int kImmMasters = 2;
@@ -58,20 +54,20 @@ struct SlatfJointSetup {
   SlatfJointParams<Scalar> params;
   AnyResampling resampling;
   int particles = 100;
-  int max_masters = 1;  ///< 1, or up to AnySlat::kMasters: storage and time grow with the square
+  int max_masters = 1;  ///< 1, or up to kMostMasters: storage and time grow with the square
 };
 
 template <class Motion>
-using SlatfPointer =
-    std::unique_ptr<typename AnySlat<typename Motion::Scalar, Motion::kStates>::Interface>;
+using SlatfInterface = bindings::SlatInterface<typename Motion::Scalar, Motion::kStates>;
 
-/// Defined in slatf_lanes.hpp, and compiled in one file per instruction set.
-template <InstructionSet set, class Motion, class Master>
-SlatfPointer<Motion> make_slatf(const SlatfSetup<Motion, Master>& setup);
+/// Defined in slatf_lanes.hpp, and compiled in one file per instruction set that every processor
+/// has; for the others see make_wide_slatf().
+template <bindings::InstructionSet set, class Motion, class Master>
+SlatfInterface<Motion>* make_slatf(const SlatfSetup<Motion, Master>& setup);
 
 /// Defined and compiled in slatf_joint.cpp.
 template <class Motion>
-SlatfPointer<Motion> make_slatf_joint(const SlatfJointSetup<Motion>& setup);
+SlatfInterface<Motion>* make_slatf_joint(const SlatfJointSetup<Motion>& setup);
 
-}  // namespace bindings
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

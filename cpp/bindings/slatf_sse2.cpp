@@ -5,19 +5,21 @@
 #include "slatf_lanes.hpp"
 
 namespace auvest {
-namespace bindings {
+inline namespace AUVEST_INSTRUCTIONS {
+
+constexpr auto kSet = bindings::InstructionSet::kSse2;
 
 template <>
-struct LanesOf<InstructionSet::kSse2, float> {
+struct LanesOf<kSet, float> {
   using Type = SimdLanes<xsimd::sse2>;
 };
 
-template SlatfPointer<CompassMotion<float>> make_slatf<InstructionSet::kSse2>(
+template SlatfInterface<CompassMotion<float>>* make_slatf<kSet>(
     const SlatfSetup<CompassMotion<float>>&);
-template SlatfPointer<UnicycleMotion<float>> make_slatf<InstructionSet::kSse2>(
+template SlatfInterface<UnicycleMotion<float>>* make_slatf<kSet>(
     const SlatfSetup<UnicycleMotion<float>>&);
 
-}  // namespace bindings
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest
 
 #endif

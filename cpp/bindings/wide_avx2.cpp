@@ -7,15 +7,17 @@
 namespace auvest {
 namespace bindings {
 
-template <>
-struct LanesOf<InstructionSet::kAvx2, float> {
-  using Type = SimdLanes<xsimd::avx2>;
-};
+using Lanes = SimdLanes<xsimd::avx2>;
 
-template SlatfPointer<CompassMotion<float>> make_slatf<InstructionSet::kAvx2>(
-    const SlatfSetup<CompassMotion<float>>&);
-template SlatfPointer<UnicycleMotion<float>> make_slatf<InstructionSet::kAvx2>(
-    const SlatfSetup<UnicycleMotion<float>>&);
+template <>
+SlatInterface<float, 2>* make_wide_slatf<InstructionSet::kAvx2>(const void* setup) {
+  return slatf_in<Lanes>(arrived<SlatfSetup<CompassMotion<float>>>(setup));
+}
+
+template <>
+SlatInterface<float, 3>* make_wide_slatf<InstructionSet::kAvx2>(const void* setup) {
+  return slatf_in<Lanes>(arrived<SlatfSetup<UnicycleMotion<float>>>(setup));
+}
 
 }  // namespace bindings
 }  // namespace auvest

@@ -12,15 +12,17 @@
 namespace auvest {
 namespace bindings {
 
-template <>
-struct LanesOf<InstructionSet::kAvx512, float> {
-  using Type = SimdLanes<xsimd::avx512f>;
-};
+using Lanes = SimdLanes<xsimd::avx512f>;
 
-template SlatfPointer<CompassMotion<float>> make_slatf<InstructionSet::kAvx512>(
-    const SlatfSetup<CompassMotion<float>>&);
-template SlatfPointer<UnicycleMotion<float>> make_slatf<InstructionSet::kAvx512>(
-    const SlatfSetup<UnicycleMotion<float>>&);
+template <>
+SlatInterface<float, 2>* make_wide_slatf<InstructionSet::kAvx512>(const void* setup) {
+  return slatf_in<Lanes>(arrived<SlatfSetup<CompassMotion<float>>>(setup));
+}
+
+template <>
+SlatInterface<float, 3>* make_wide_slatf<InstructionSet::kAvx512>(const void* setup) {
+  return slatf_in<Lanes>(arrived<SlatfSetup<UnicycleMotion<float>>>(setup));
+}
 
 }  // namespace bindings
 }  // namespace auvest

@@ -69,6 +69,7 @@ struct NumTraits<ExplicitDouble> : NumTraits<double> {
 
 // A scalar brings its own elementary functions; auvest finds them where its overloads are.
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 namespace math {
 
 inline ExplicitDouble exp(ExplicitDouble x) { return ExplicitDouble(exp(double(x))); }
@@ -91,4 +92,5 @@ inline void sincos(ExplicitDouble x, ExplicitDouble& s, ExplicitDouble& c) {
 inline void sincos_near(ExplicitDouble x, ExplicitDouble& s, ExplicitDouble& c) { sincos(x, s, c); }
 
 }  // namespace math
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

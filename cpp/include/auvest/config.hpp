@@ -79,3 +79,22 @@ static_assert(sizeof(float) == 4 && FLT_RADIX == 2 && FLT_MANT_DIG == 24,
 
 // What is rarely run: called, so that it takes no registers from what is often run.
 #define AUVEST_COLD __attribute__((cold, noinline))
+
+// One program may hold code for several instruction sets, and choose at run time. Of an inline
+// function that is compiled for two of them the linker keeps one, whichever it meets first; so all
+// of auvest lies in an inline namespace of the set that its file is compiled for, and the two are
+// two functions. Nobody needs to write the name. A build may define another, for flags not told
+// apart here.
+#if !defined(AUVEST_INSTRUCTIONS)
+#if defined(__AVX512F__)
+#define AUVEST_INSTRUCTIONS with_avx512
+#elif defined(__AVX2__)
+#define AUVEST_INSTRUCTIONS with_avx2
+#elif defined(__AVX__)
+#define AUVEST_INSTRUCTIONS with_avx
+#elif defined(__SSE4_1__)
+#define AUVEST_INSTRUCTIONS with_sse4
+#else
+#define AUVEST_INSTRUCTIONS baseline
+#endif
+#endif

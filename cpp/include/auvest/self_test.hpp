@@ -22,6 +22,7 @@
 #include "auvest/models/range_bearing.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// What a self-test looks at, in this order.
 enum class SelfTestPart : std::uint8_t {
@@ -263,4 +264,5 @@ AUVEST_OUTLINE inline SelfTestResult self_test() {
   return check.result;
 }
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

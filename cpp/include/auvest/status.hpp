@@ -6,6 +6,7 @@
 #include "auvest/config.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 enum class Status : std::uint8_t {
   kOk = 0,
@@ -41,4 +42,5 @@ inline const char* describe(Status status) {
   return "unknown status";
 }
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -4,6 +4,7 @@
 #include "auvest/eigen.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// Fixed-size matrix; row-major, without alignment requirements, so that it can be a member, an
 /// array element or a value argument anywhere (C++11 has no aligned new) and looks like NumPy's.
@@ -25,4 +26,5 @@ struct Belief {
   Matrix<Scalar, N, N> P;
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -8,6 +8,7 @@
 #include "auvest/filters/gaussian_filter.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Filter, class Policy_>
 class AdaptiveInterval : public Filter {
@@ -84,4 +85,5 @@ class AdaptiveInterval : public Filter {
   Status policy_check_;
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

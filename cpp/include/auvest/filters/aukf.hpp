@@ -6,9 +6,11 @@
 #include "auvest/intervals/mahalanobis_interval.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// AUKF = UKF + interval policy; the default policy is the paper's law.
 template <class Process, class Policy = MahalanobisInterval<typename Process::Scalar>>
 using Aukf = AdaptiveInterval<Ukf<Process>, Policy>;
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -16,6 +16,7 @@
 #include "auvest/filters/sigma_point_filter.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar>
 struct CubaturePoints {
@@ -72,4 +73,5 @@ class Ckf : public SigmaPointFilter<Process, CubaturePoints<typename Process::Sc
   explicit Ckf(const Process& process) : Base(process, CubaturePoints<Scalar>(Process::kStates)) {}
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

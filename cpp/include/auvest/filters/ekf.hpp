@@ -5,6 +5,7 @@
 #include "auvest/filters/gaussian_filter.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// The first-order expansion of h at the mean, with the second-order term of a model that has one,
 /// as GaussianFilter asks for it.
@@ -47,4 +48,5 @@ class Ekf : public GaussianFilter<Ekf<Process>, Process> {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -18,6 +18,7 @@
 #include "auvest/types.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Derived, class Process_>
 class GaussianFilter {
@@ -161,4 +162,5 @@ class GaussianFilter {
   bool initialised_;
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

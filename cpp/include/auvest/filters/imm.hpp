@@ -29,6 +29,7 @@
 #include "auvest/types.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Value, int K>
 AUVEST_INLINE Value largest(const Vector<Value, K>& values) {
@@ -260,4 +261,5 @@ class Imm {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

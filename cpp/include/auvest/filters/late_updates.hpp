@@ -13,6 +13,7 @@
 #include "auvest/status.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// A prediction or an update, as it can be done again.
 template <class Filter, class Sensor>
@@ -185,4 +186,5 @@ class LateUpdates {
   Memory memory_;
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

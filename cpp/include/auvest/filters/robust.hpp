@@ -6,6 +6,7 @@
 #include "auvest/robust/robust_update.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Filter, class Rule_>
 class Robust : public Filter {
@@ -60,4 +61,5 @@ class Robust : public Filter {
   Status rule_check_;
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -7,9 +7,11 @@
 #include "auvest/robust/rejection_streak.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Process, class Kernel = Igg<typename Process::Scalar>,
           class Recovery = RejectionStreak<typename Process::Scalar>>
 using RobustEkf = Robust<Ekf<Process>, RobustUpdate<Kernel, Recovery>>;
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

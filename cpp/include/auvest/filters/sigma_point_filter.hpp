@@ -13,6 +13,7 @@
 #include "auvest/filters/gaussian_filter.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// The mean and the covariance of h over a belief whose P_oo is root root', as GaussianFilter asks
 /// for them.
@@ -97,4 +98,5 @@ class SigmaPointFilter : public GaussianFilter<SigmaPointFilter<Process, Points_
   Points points_;
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

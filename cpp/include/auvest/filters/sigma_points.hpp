@@ -18,6 +18,7 @@
 #include "auvest/types.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar>
 struct SigmaPoints {
@@ -98,4 +99,5 @@ struct SigmaPoints {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -32,6 +32,7 @@
 #include "auvest/types.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// What an update reports. On anything but kOk the numbers are zero.
 template <class Scalar, int M>
@@ -296,4 +297,5 @@ struct SquareRootUpdate {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -6,6 +6,7 @@
 #include "auvest/filters/sigma_points.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Process>
 class Ukf : public SigmaPointFilter<Process, SigmaPoints<typename Process::Scalar>> {
@@ -25,4 +26,5 @@ class Ukf : public SigmaPointFilter<Process, SigmaPoints<typename Process::Scala
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -4,6 +4,7 @@
 #include "auvest/math/basic.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar>
 struct IntervalLimits {
@@ -18,4 +19,5 @@ struct IntervalLimits {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

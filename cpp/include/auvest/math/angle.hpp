@@ -14,6 +14,7 @@
 #include "auvest/math/trigonometry.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 namespace math {
 
 /// The angle of (-pi, pi] that is congruent to `a` (rad) modulo 2 pi. "pi" as a bound is the
@@ -66,4 +67,5 @@ AUVEST_INLINE double wrap(double a) {
 }
 
 }  // namespace math
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -14,6 +14,7 @@
 #include "auvest/math/select.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 namespace math {
 
 template <class Scalar>
@@ -102,4 +103,5 @@ inline float scale_by_power(float x, int32_t power) {
 
 }  // namespace detail
 }  // namespace math
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -7,6 +7,7 @@
 #include "auvest/config.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 namespace math {
 
 /// The IEEE 754 binary32 pattern of `x`.
@@ -30,4 +31,5 @@ constexpr unsigned leading(uint32_t bits) {
 }
 
 }  // namespace math
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -15,6 +15,7 @@
 #include "auvest/math/select.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 namespace math {
 
 /// What makes the deviates of one call different from those of all others.
@@ -106,4 +107,5 @@ AUVEST_INLINE void counter_normal_pair(const CounterKey& key, const Word& index,
 }
 
 }  // namespace math
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -15,6 +15,7 @@
 #include "auvest/math/bits.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 namespace math {
 namespace detail {
 
@@ -109,4 +110,5 @@ inline double exp_normal(double x) { return exp(x); }
 inline double log_normal(double x) { return log(x); }
 
 }  // namespace math
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

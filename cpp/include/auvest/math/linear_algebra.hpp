@@ -15,6 +15,7 @@
 #include "auvest/types.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 namespace math {
 
 #if defined(AUVEST_AVR_KERNELS)
@@ -333,4 +334,5 @@ inline Matrix<Scalar, N, N> symmetric_product(const Matrix<Scalar, N, N>& phi,
 }
 
 }  // namespace math
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

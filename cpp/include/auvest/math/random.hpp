@@ -14,6 +14,7 @@
 #include "auvest/math/trigonometry.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 namespace math {
 
 class Random;
@@ -154,4 +155,5 @@ struct Uniform<Scalar, 8> {
 
 }  // namespace detail
 }  // namespace math
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

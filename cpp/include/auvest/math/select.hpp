@@ -8,6 +8,7 @@
 #include "auvest/config.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 namespace math {
 
 /// The number type inside a value: the value's own type, or that of a batch's lanes.
@@ -42,4 +43,5 @@ AUVEST_INLINE Value larger(const Value& a, const Value& b) {
 }
 
 }  // namespace math
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -17,6 +17,7 @@
 #include "auvest/math/twin.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 namespace math {
 
 /// One 32-bit unsigned integer per lane.
@@ -312,4 +313,5 @@ AUVEST_INLINE Value wrap(const Value& a) {
 }
 
 }  // namespace math
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -17,6 +17,7 @@
 #include "auvest/math/bits.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 namespace math {
 namespace detail {
 
@@ -404,4 +405,5 @@ inline double DoubleTrigonometry<4>::atan2(double y, double x) {
 
 }  // namespace detail
 }  // namespace math
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

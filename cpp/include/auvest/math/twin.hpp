@@ -10,6 +10,7 @@
 #include "auvest/types.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 namespace math {
 
 template <class Mask_>
@@ -146,4 +147,5 @@ AUVEST_INLINE void split(const Matrix<Twin<Value>, Rows, Cols>& both, Matrix<Val
 }
 
 }  // namespace math
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

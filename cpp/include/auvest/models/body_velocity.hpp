@@ -24,6 +24,7 @@
 #include "auvest/models/measurement_model.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// Whatever the number of states and axes.
 template <class Scalar>
@@ -128,4 +129,5 @@ struct BodyVelocity : MeasurementModel<BodyVelocity<Scalar_, N, Axes>, Scalar_, 
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -15,6 +15,7 @@
 #include "auvest/models/process_model.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// Power spectral densities of the white noise on the rates of the six states, equal for x and y.
 template <class Scalar>
@@ -191,4 +192,5 @@ using EulerAcceleration = ConstantAcceleration<Scalar, 1>;
 template <class Scalar>
 using ExactAcceleration = ConstantAcceleration<Scalar, 2>;
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

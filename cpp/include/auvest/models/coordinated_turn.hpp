@@ -25,6 +25,7 @@
 #include "auvest/models/constant_acceleration.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 struct CoordinatedTurn : ProcessModel<CoordinatedTurn<Scalar_>, Scalar_, 6> {
@@ -158,4 +159,5 @@ struct CoordinatedTurn : ProcessModel<CoordinatedTurn<Scalar_>, Scalar_, 6> {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

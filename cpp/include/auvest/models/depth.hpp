@@ -14,6 +14,7 @@
 #include "auvest/models/measurement_model.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// Whatever the number of states.
 template <class Scalar>
@@ -83,4 +84,5 @@ struct Depth : MeasurementModel<Depth<Scalar_, N>, Scalar_, N, 1, 3> {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -20,6 +20,7 @@
 #include "auvest/models/measurement_model.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// Whatever the number of states.
 template <class Scalar>
@@ -146,4 +147,5 @@ struct LeaderRange : MeasurementModel<LeaderRange<Scalar_, N>, Scalar_, N, 1, 2>
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

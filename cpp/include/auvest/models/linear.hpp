@@ -7,6 +7,7 @@
 #include "auvest/models/process_model.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// x(k+1) = Phi x(k) + w, w ~ N(0, Q), for one fixed step: dt only says that a step was taken.
 template <class Scalar_, int N>
@@ -83,4 +84,5 @@ struct LinearMeasurement
   const Noise& R() const { return noise; }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -34,6 +34,7 @@
 #include "auvest/types.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Derived, class Scalar_, int N, int M, int Observed = N>
 struct MeasurementModel {
@@ -105,4 +106,5 @@ struct MeasurementModel {
   const Derived& derived() const { return static_cast<const Derived&>(*this); }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

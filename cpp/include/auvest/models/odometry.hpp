@@ -14,6 +14,7 @@
 #include "auvest/models/process_model.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 struct Odometry : ProcessModel<Odometry<Scalar_>, Scalar_, 3> {
@@ -91,4 +92,5 @@ struct Odometry : ProcessModel<Odometry<Scalar_>, Scalar_, 3> {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -12,6 +12,7 @@
 #include "auvest/models/constant_acceleration.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 struct PiecewiseAcceleration : ProcessModel<PiecewiseAcceleration<Scalar_>, Scalar_, 6> {
@@ -77,4 +78,5 @@ struct PiecewiseAcceleration : ProcessModel<PiecewiseAcceleration<Scalar_>, Scal
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -13,6 +13,7 @@
 #include "auvest/models/measurement_model.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// Whatever the number of states.
 template <class Scalar, int M>
@@ -100,4 +101,5 @@ struct Position : MeasurementModel<Position<Scalar_, N, M>, Scalar_, N, M, M> {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -25,6 +25,7 @@
 #include "auvest/types.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Derived, class Scalar_, int N>
 struct ProcessModel {
@@ -89,4 +90,5 @@ struct ProcessModel {
   const Derived& derived() const { return static_cast<const Derived&>(*this); }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

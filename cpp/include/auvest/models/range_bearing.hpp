@@ -29,6 +29,7 @@
 #include "auvest/models/measurement_model.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_, int N>
 struct RangeBearing : MeasurementModel<RangeBearing<Scalar_, N>, Scalar_, N, 2, 2> {
@@ -226,4 +227,5 @@ struct RangeBearing : MeasurementModel<RangeBearing<Scalar_, N>, Scalar_, N, 2, 
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -50,6 +50,7 @@
 #include "auvest/models/measurement_model.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// Whatever the number of states.
 template <class Scalar>
@@ -300,4 +301,5 @@ struct RangeBearingElevation
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

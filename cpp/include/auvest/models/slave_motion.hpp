@@ -34,6 +34,7 @@
 #include "auvest/types.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 struct CompassMotion {
@@ -241,4 +242,5 @@ struct UnicycleMotion {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -15,6 +15,7 @@
 #include "auvest/types.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 enum class Bearing : std::uint8_t {
   kMasterToSlave,  ///< from the x axis, from the master to the slave: the paper's
@@ -99,4 +100,5 @@ struct Sonar {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

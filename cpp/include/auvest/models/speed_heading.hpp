@@ -21,6 +21,7 @@
 #include "auvest/models/process_model.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// Of the model in all its sizes.
 template <class Scalar>
@@ -142,4 +143,5 @@ struct SpeedHeading : ProcessModel<SpeedHeading<Scalar_, HeadingBias, SpeedScale
   };
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -15,6 +15,7 @@
 #include "auvest/models/process_model.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// Of the model in both sizes: power spectral densities of the accelerations.
 template <class Scalar>
@@ -140,4 +141,5 @@ struct WhiteAcceleration : ProcessModel<WhiteAcceleration<Scalar_, Axes>, Scalar
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

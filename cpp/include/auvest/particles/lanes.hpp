@@ -19,6 +19,7 @@
 #include "auvest/config.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// Particles per block, and partial sums per sum over particles (ordered_sum.hpp).
 constexpr int kBlock = 16;
@@ -45,4 +46,5 @@ struct OneLane {
   static AUVEST_INLINE void prefetch(const Scalar*) {}
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

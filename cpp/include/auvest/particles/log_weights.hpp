@@ -8,6 +8,7 @@
 #include "auvest/particles/ordered_sum.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// The logarithm that stands for a weight of zero: finite, so that differences stay numbers.
 template <class Scalar>
@@ -84,4 +85,5 @@ inline void equal_weights(Set& set) {
   for (; place_in_block(i) != 0; ++i) set.log_weights()[i] = no_log_weight<Scalar>();
 }
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

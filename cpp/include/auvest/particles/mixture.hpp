@@ -12,6 +12,7 @@
 #include "auvest/types.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// Numbers in the lower triangle of an n x n matrix.
 constexpr int triangle_numbers(int n) { return n * (n + 1) / 2; }
@@ -171,4 +172,5 @@ Belief<typename Set::Scalar, N> summarise(const Set& set, int field) {
   return belief;
 }
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

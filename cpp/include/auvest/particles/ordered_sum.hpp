@@ -9,6 +9,7 @@
 #include "auvest/particles/lanes.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// The sum of `count` partial sums, a power of two; they are overwritten.
 template <class Scalar>
@@ -47,4 +48,5 @@ class OrderedSum {
   Value partial_[kBlock / Lanes::kWidth];
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

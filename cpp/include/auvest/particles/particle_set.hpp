@@ -14,6 +14,7 @@
 #include "auvest/particles/lanes.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_, int Fields>
 class ParticleSet {
@@ -91,4 +92,5 @@ struct ParticleStorage {
   Scalar numbers[ParticleSet<Scalar, Fields>::storage_size(Capacity)];
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

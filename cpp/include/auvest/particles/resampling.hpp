@@ -18,6 +18,7 @@
 #include "auvest/particles/log_weights.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 namespace detail {
 
 /// w[i] <- base(w[i]) + the number of ascending positions, `draws` in [0, 1), that fall on particle
@@ -181,4 +182,5 @@ inline void resample(const Policy& policy, Set& set, math::Random& random) {
   redistribute(set);
 }
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

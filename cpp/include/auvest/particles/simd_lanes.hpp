@@ -10,6 +10,7 @@
 #include "auvest/particles/lanes.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// Two groups of lanes, of which the second lies `Stride` numbers behind the first.
 template <class Lanes, int Stride>
@@ -55,4 +56,5 @@ struct SimdLanes {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -21,6 +21,7 @@
 #include "auvest/particles/lanes.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Lanes, class Set>
 class Tiles {
@@ -118,4 +119,5 @@ class Tiles {
       32768 / static_cast<int>(sizeof(typename Set::Scalar) * (1 + Set::kFields));
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

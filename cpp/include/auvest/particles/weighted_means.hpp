@@ -7,6 +7,7 @@
 #include "auvest/particles/ordered_sum.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 namespace detail {
 
@@ -63,4 +64,5 @@ AUVEST_OUTLINE void weighted_means(const Set& set, const Quantity& quantity,
   }
 }
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -10,6 +10,7 @@
 #include "auvest/robust/kernel.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 struct Hampel : Kernel<Hampel<Scalar_>, Scalar_> {
@@ -62,4 +63,5 @@ struct Hampel : Kernel<Hampel<Scalar_>, Scalar_> {
   Scalar slope(Scalar size) const { return (params.c - size) / (params.c - params.b); }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -8,6 +8,7 @@
 #include "auvest/robust/kernel.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 struct Huber : Kernel<Huber<Scalar_>, Scalar_> {
@@ -42,4 +43,5 @@ struct Huber : Kernel<Huber<Scalar_>, Scalar_> {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -14,6 +14,7 @@
 #include "auvest/robust/kernel.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 struct Igg : Kernel<Igg<Scalar_>, Scalar_> {
@@ -55,4 +56,5 @@ struct Igg : Kernel<Igg<Scalar_>, Scalar_> {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -19,6 +19,7 @@
 #include "auvest/status.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Derived, class Scalar_>
 struct Kernel {
@@ -36,4 +37,5 @@ struct Kernel {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -12,6 +12,7 @@
 #include "auvest/robust/robust_correction.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 struct NoRecovery {
@@ -31,4 +32,5 @@ struct NoRecovery {
   Status check() const { return Status::kOk; }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

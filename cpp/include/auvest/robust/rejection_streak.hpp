@@ -35,6 +35,7 @@
 #include "auvest/robust/robust_correction.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 struct RejectionStreak {
@@ -153,4 +154,5 @@ struct RejectionStreak {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

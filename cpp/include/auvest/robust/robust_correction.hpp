@@ -6,6 +6,7 @@
 #include "auvest/filters/square_root_update.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// What became of a measurement.
 enum class Decision : std::uint8_t {
@@ -37,4 +38,5 @@ struct RobustCorrection : Correction<Scalar, M> {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -26,6 +26,7 @@
 #include "auvest/robust/robust_correction.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// Which residual the kernel judges. The paper does not say.
 enum class Residual : std::uint8_t {
@@ -220,4 +221,5 @@ struct RobustUpdate {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -5,6 +5,7 @@
 #include "auvest/robust/kernel.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 struct Unit : Kernel<Unit<Scalar_>, Scalar_> {
@@ -21,4 +22,5 @@ struct Unit : Kernel<Unit<Scalar_>, Scalar_> {
   Status check() const { return Status::kOk; }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -6,6 +6,7 @@
 #include "auvest/intervals/mahalanobis_interval.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 struct AnyInterval {
@@ -60,4 +61,5 @@ struct AnyInterval {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -7,6 +7,7 @@
 #include "auvest/robust/unit.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 struct AnyKernel : Kernel<AnyKernel<Scalar_>, Scalar_> {
@@ -67,4 +68,5 @@ struct AnyKernel : Kernel<AnyKernel<Scalar_>, Scalar_> {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -16,6 +16,7 @@
   X(kCkf, Ckf)
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 struct AnyLinearisation {
@@ -62,4 +63,5 @@ struct AnyLinearisation {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -4,6 +4,7 @@
 #include "auvest/robust/rejection_streak.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 struct AnyRecovery {
@@ -23,4 +24,5 @@ struct AnyRecovery {
   Status check() const { return streak.check(); }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

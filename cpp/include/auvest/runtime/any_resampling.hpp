@@ -6,6 +6,7 @@
 #include "auvest/particles/resampling.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 struct AnyResampling {
   enum class Kind : std::uint8_t { kSystematic, kStratified, kResidual, kMultinomial };
@@ -28,4 +29,5 @@ struct AnyResampling {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

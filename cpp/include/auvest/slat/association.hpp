@@ -9,6 +9,7 @@
 #include "auvest/types.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// The position of a master: mean, and root of its covariance.
 template <class Value>
@@ -108,4 +109,5 @@ AUVEST_INLINE void give_birth(const Sonar<Scalar>& sonar, const Vector<Scalar, 2
   }
 }
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -10,6 +10,7 @@
 #include "auvest/types.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Motion_>
 class DeadReckoning : public SlatFilter<Motion_, 0> {
@@ -68,4 +69,5 @@ class DeadReckoning : public SlatFilter<Motion_, 0> {
   SlaveBelief pose_;
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -7,6 +7,7 @@
 #include "auvest/types.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// The master of an echo of which nobody knows whose it is.
 constexpr int kUnknownMaster = -1;
@@ -62,4 +63,5 @@ AUVEST_INLINE void add_planned_change(const Vector<Scalar, 2>& change, Scalar dt
   }
 }
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -14,6 +14,7 @@
 #include "auvest/types.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Motion_, class Master_, int Masters>
 class EkfSlat : public SlatFilter<Motion_, Masters> {
@@ -120,4 +121,5 @@ class EkfSlat : public SlatFilter<Motion_, Masters> {
   Scalar nis_ = Scalar(0);
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -21,6 +21,7 @@
 #include "auvest/slat/master_bank.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// Corrects the belief stored from `at` on by `ekf`, in the lanes of `only` (null: all) where that
 /// is valid; gives that belief and returns the logarithm of the echo's density.
@@ -350,4 +351,5 @@ class EkfSlat<Motion_, Imm<Models...>, Masters> : public SlatFilter<Motion_, Mas
   Scalar nis_ = Scalar(0);
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -17,6 +17,7 @@
 #include "auvest/types.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Motion_, class Master_, int Masters>
 struct JointGaussian {
@@ -278,4 +279,5 @@ struct JointGaussian {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

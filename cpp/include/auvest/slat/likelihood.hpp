@@ -8,6 +8,7 @@
 #include "auvest/types.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// log N(innovation; 0, S) + M/2 log(2 pi) of [SLATF 31] from what potter() leaves; never below
 /// -1e20, nor a NaN. -1e20 where `valid` is false.
@@ -43,4 +44,5 @@ AUVEST_INLINE void saturate(const Value& gate, Posterior<Value, O>& posterior) {
   }
 }
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -9,6 +9,7 @@
 #include "auvest/types.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Master, class Lanes>
 struct MasterBank {
@@ -32,4 +33,5 @@ struct MasterBank {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -14,6 +14,7 @@
 #include "auvest/types.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Value>
 struct MasterEkf {
@@ -87,4 +88,5 @@ AUVEST_INLINE void hand_out_posterior(const MasterEkf<math::Twin<Value>>& from,
   to[1].valid = from.valid.b;
 }
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

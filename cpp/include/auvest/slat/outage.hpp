@@ -16,6 +16,7 @@
 #include "auvest/types.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 enum class Communication : std::uint8_t {
   kNever,  ///< nothing was shared yet
@@ -110,4 +111,5 @@ class Outage {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

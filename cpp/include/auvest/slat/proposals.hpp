@@ -15,6 +15,7 @@
 #include "auvest/types.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 struct MotionProposal {
   static constexpr bool kInformed = false;
@@ -75,4 +76,5 @@ struct MeasurementProposal {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -22,6 +22,7 @@
 #include "auvest/types.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// Masters: how many there may be.
 template <class Motion_, int Masters>
@@ -194,4 +195,5 @@ class ParticleSlatFilter : public SlatFilter<Motion, Masters> {
   Scalar effective_size_ = Scalar(0);
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

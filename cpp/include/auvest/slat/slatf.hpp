@@ -33,6 +33,7 @@
 #include "auvest/types.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Particle, int Masters, class Resampling>
 using SlatfFrame =
@@ -363,4 +364,5 @@ template <class Motion, class Master, int Masters, class Resampling = Systematic
           class Lanes = OneLane<typename Motion::Scalar>>
 using Slatf2 = Slatf<Motion, Master, MeasurementProposal, Masters, Resampling, Lanes>;
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

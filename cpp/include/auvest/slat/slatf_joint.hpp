@@ -29,6 +29,7 @@
 #include "auvest/types.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar>
 struct SlatfJointParams {
@@ -266,4 +267,5 @@ class SlatfJoint : public SlatfJointFrame<Motion_, Masters, Resampling_>,
   Params params_;
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -19,6 +19,7 @@
 #include "auvest/types.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar>
 struct SlatfParams {
@@ -450,4 +451,5 @@ struct SlatfParticle {
   };
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

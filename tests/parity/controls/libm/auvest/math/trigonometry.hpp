@@ -7,6 +7,7 @@
 #include "auvest/math/basic.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 namespace math {
 namespace detail {
 
@@ -25,4 +26,5 @@ inline void sincos(float x, float& s, float& c) {
 inline void sincos_near(float x, float& s, float& c) { sincos(x, s, c); }
 
 }  // namespace math
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest
