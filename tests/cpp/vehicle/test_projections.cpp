@@ -63,6 +63,8 @@ void check_rows(const typename Vehicle::Params& params, double epsilon) {
   }
 }
 
+const Remus<double>::Command kNone = Remus<double>::Command::Zero();
+
 template <class Scalar>
 typename Yacht<Scalar>::Params yacht() {
   auto p = auvest::remus100<Scalar, auvest::Keel<Scalar>>();
@@ -106,7 +108,7 @@ TEST_CASE(
       eta(i) = x(i) = uniform();
       nu(i) = x(6 + i) = uniform();
     }
-    six.rate(x, Remus<double>::Command::Zero().eval(), current<Remus<double>>(0.1, 0.2, 0.3), dx);
+    six.rate(x, kNone, current<Remus<double>>(0.1, 0.2, 0.3), dx);
     const peer::Vec3 velocity = peer::rotation(eta(3), eta(4), eta(5)) * nu.head<3>();
     const peer::Vec3 turning = peer::euler_rates(eta(3), eta(4)) * nu.tail<3>();
     for (int i = 0; i < 3; ++i) {
@@ -121,7 +123,7 @@ TEST_CASE(
     const Five five(auvest::remus100<double>());
     Five::State x, dx;
     x << 0, 0, 0, theta, psi, u, v, w, q, r, 0, 0, 0;
-    five.rate(x, Five::Command::Zero().eval(), current<Five>(0, 0, 0), dx);
+    five.rate(x, kNone, current<Five>(0, 0, 0), dx);
     const peer::Vec3 velocity = peer::rotation(0, theta, psi) * peer::Vec3(u, v, w);
     for (int i = 0; i < 3; ++i) CHECK(std::fabs(dx(i) - velocity(i)) < 1e-15);
     CHECK(dx(3) == q);
@@ -132,7 +134,7 @@ TEST_CASE(
     const Four four(auvest::remus100<double>());
     Four::State x, dx;
     x << 0, 0, phi, psi, u, v, p, r, 0, 0, 0;
-    four.rate(x, Four::Command::Zero().eval(), current<Four>(0, 0, 0), dx);
+    four.rate(x, kNone, current<Four>(0, 0, 0), dx);
     CHECK(std::fabs(dx(0) - (u * std::cos(psi) - v * std::cos(phi) * std::sin(psi))) < 1e-15);
     CHECK(std::fabs(dx(1) - (u * std::sin(psi) + v * std::cos(phi) * std::cos(psi))) < 1e-15);
     CHECK(dx(2) == p);
@@ -178,11 +180,11 @@ TEST_CASE("with a righting arm roll makes the hull lighter in sway") {
   const auto p = auvest::remus100<double>();
   const auto planar = turn<ThreeDof, double>(p);
   const auto six = turn<SixDof, double>(p);
-  const double printed[2][3] = {{-9.7192, 4.9670, 5.55368}, {-9.6810, 4.9012, 5.55815}};
+  const double printed[2][3] = {{-9.7192, 4.9670, 5.55368}, {-9.6810, 4.9012, 5.558145}};
   for (std::size_t i = 0; i < 3; ++i) {
-    const double unit = i < 2 ? 1e-4 : 1e-5;
-    CHECK(std::fabs(planar[i] - printed[0][i]) <= 0.5001 * unit);
-    CHECK(std::fabs(six[i] - printed[1][i]) <= 0.5001 * unit);
+    const double unit[2] = {i < 2 ? 1e-4 : 1e-5, i < 2 ? 1e-4 : 1e-6};
+    CHECK(std::fabs(planar[i] - printed[0][i]) <= 0.5001 * unit[0]);
+    CHECK(std::fabs(six[i] - printed[1][i]) <= 0.5001 * unit[1]);
   }
   const peer::Mat6 inverse = Remus<double>(p).mass_matrix().inverse();
   CHECK(std::fabs(1 / inverse(1, 1) - 59.761) <= 0.5e-3);
