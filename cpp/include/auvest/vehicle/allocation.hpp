@@ -103,7 +103,7 @@ class Allocation {
 
   Params params;
 
-  Allocation(const Inverse& inverse, const Params& p) : params(p) { math::copy(inverse, inverse_); }
+  Allocation(const Inverse& B, const Params& p) : params(p) { math::copy(B, inverse_); }
 
   const Inverse& inverse() const { return inverse_; }
 
