@@ -76,7 +76,6 @@ struct CoefficientTorpedo {
     const Value rudder_uu = u * u * actuators[kRudder];
     const Value stern_uu = u * u * actuators[kSternPlanes];
     const Params& c = params;
-    // [HULL D7]
     const Value force[6] = {
         Value(c.x_uu) * u * math::absolute(u) + Value(c.x_wq) * w * q + Value(c.x_qq) * q * q +
             Value(c.x_vr) * v * r + Value(c.x_rr) * r * r + Value(c.thrust_n_s2) * turns,
@@ -91,7 +90,7 @@ struct CoefficientTorpedo {
             Value(c.n_wp) * w * p + Value(c.n_pq) * p * q + Value(c.n_uu_rudder) * rudder_uu};
     AUVEST_UNROLL
     for (int i = 0; i < 6; ++i) {
-      if (Freedom::keeps(i)) tau[i] = tau[i] + force[i];
+      if (Freedom::keeps(i)) tau[i] = tau[i] + force[i];  // [HULL D7]
     }
   }
 
