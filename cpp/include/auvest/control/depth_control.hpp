@@ -17,9 +17,9 @@ class DepthControl {
   using Scalar = Scalar_;
 
   struct Params {
-    Scalar proportional = Scalar(0.1);            ///< Kp [rad/m], >= 0
-    Scalar integral = Scalar(0.005);              ///< Ki [rad/(m s)], >= 0
-    Scalar max_pitch_rad = Scalar(0.3490658504);  ///< theta_max, > 0; 20 deg
+    Scalar proportional = Scalar(0.1);                  ///< Kp [rad/m], >= 0
+    Scalar integral = Scalar(0.005);                    ///< Ki [rad/(m s)], >= 0
+    Scalar max_pitch_rad = Scalar(0.3490658503988659);  ///< theta_max, > 0; 20 deg
 
     /// Names every member, in the order of stored records.
     template <class Visitor>

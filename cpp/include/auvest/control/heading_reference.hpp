@@ -21,8 +21,9 @@ class HeadingReference {
   using Scalar = Scalar_;
 
   struct Params {
-    Scalar gain = Scalar(1);                       ///< k [1/s], > 0
-    Scalar max_rate_rad_s = Scalar(0.1047197551);  ///< r_max, > 0; 6 deg/s: what a torpedo can turn
+    Scalar gain = Scalar(1);  ///< k [1/s], > 0
+    Scalar max_rate_rad_s =
+        Scalar(0.10471975511965978);  ///< r_max, > 0; 6 deg/s: what a torpedo can turn
 
     /// Names every member, in the order of stored records.
     template <class Visitor>

@@ -18,10 +18,10 @@ class PitchControl {
   using Scalar = Scalar_;
 
   struct Params {
-    Scalar proportional = Scalar(1.5);            ///< Kp, >= 0
-    Scalar derivative = Scalar(1);                ///< Kd [s], >= 0
-    Scalar integral = Scalar(0.2);                ///< Ki [1/s], >= 0
-    Scalar max_plane_rad = Scalar(0.2617993878);  ///< ds_max, > 0; 15 deg
+    Scalar proportional = Scalar(1.5);                  ///< Kp, >= 0
+    Scalar derivative = Scalar(1);                      ///< Kd [s], >= 0
+    Scalar integral = Scalar(0.2);                      ///< Ki [1/s], >= 0
+    Scalar max_plane_rad = Scalar(0.2617993877991494);  ///< ds_max, > 0; 15 deg
 
     /// Names every member, in the order of stored records.
     template <class Visitor>

@@ -66,7 +66,8 @@ class PoseControl {
       return Status::kNotFinite;
     }
     if (dt < Scalar(0)) return Status::kTimeBackwards;
-    if (math::absolute(math::wrap(pose(4))) > Scalar(1.3962634016)) return Status::kBadParameter;
+    if (math::absolute(math::wrap(pose(4))) > Scalar(1.3962634015954636))
+      return Status::kBadParameter;
     Vector6 error;
     Vector6 pull;  // Kp e + Ki int e
     for (int i = 0; i < 6; ++i) {

@@ -8,9 +8,9 @@ namespace auvest {
 /// In the unit of the value: rad for a heading or pitch, m for a depth.
 template <class Scalar>
 struct Reference {
-  Scalar value;
-  Scalar rate;          ///< per s
-  Scalar acceleration;  ///< per s^2
+  Scalar value = Scalar(0);
+  Scalar rate = Scalar(0);          ///< per s
+  Scalar acceleration = Scalar(0);  ///< per s^2
 };
 
 }  // namespace auvest

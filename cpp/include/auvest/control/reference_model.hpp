@@ -23,9 +23,9 @@ class ReferenceModel {
   using Scalar = Scalar_;
 
   struct Params {
-    Scalar frequency_rad_s = Scalar(0.5);    ///< w, > 0; dt (2 zeta + 1) w must be well below 1
-    Scalar damping = Scalar(1);              ///< zeta, > 0; 1: no overshoot
-    Scalar max_rate = Scalar(0.1047197551);  ///< of |v_d| per s, > 0; 6 deg/s
+    Scalar frequency_rad_s = Scalar(0.5);  ///< w, > 0; dt (2 zeta + 1) w must be well below 1
+    Scalar damping = Scalar(1);            ///< zeta, > 0; 1: no overshoot
+    Scalar max_rate = Scalar(0.10471975511965978);  ///< of |v_d| per s, > 0; 6 deg/s
 
     /// Names every member, in the order of stored records.
     template <class Visitor>
@@ -37,9 +37,7 @@ class ReferenceModel {
   };
 
   explicit ReferenceModel(const Params& params = Params())
-      : params_(params), check_(valid(params) ? Status::kOk : Status::kBadParameter) {
-    state_.value = state_.rate = state_.acceleration = Scalar(0);
-  }
+      : params_(params), check_(valid(params) ? Status::kOk : Status::kBadParameter) {}
 
   /// kBadParameter if a parameter is out of range: everything else then refuses, too.
   Status check() const { return check_; }

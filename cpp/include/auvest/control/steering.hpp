@@ -8,11 +8,11 @@ namespace auvest {
 
 template <class Scalar>
 struct Steering {
-  Scalar time_constant_s = Scalar(1);            ///< T, > 0
-  Scalar gain = Scalar(0.6);                     ///< K [1/s], > 0, at `speed_m_s`
-  Scalar speed_m_s = Scalar(1.5);                ///< the speed for which K is given, > 0
-  Scalar slowest_m_s = Scalar(0);                ///< K stays below this speed; 0: K is a constant
-  Scalar max_rudder_rad = Scalar(0.2617993878);  ///< limit of |delta|, > 0; 15 deg
+  Scalar time_constant_s = Scalar(1);  ///< T, > 0
+  Scalar gain = Scalar(0.6);           ///< K [1/s], > 0, at `speed_m_s`
+  Scalar speed_m_s = Scalar(1.5);      ///< the speed for which K is given, > 0
+  Scalar slowest_m_s = Scalar(0);      ///< K stays below this speed; 0: K is a constant
+  Scalar max_rudder_rad = Scalar(0.2617993877991494);  ///< limit of |delta|, > 0; 15 deg
 
   /// Names every member, in the order of stored records.
   template <class Visitor>

@@ -27,8 +27,8 @@ namespace auvest {
 /// What to steer.
 template <class Scalar>
 struct GuidanceCommand {
-  Scalar heading_rad;  ///< psi_ref, in (-pi, pi]; a course where the law says so
-  Scalar rate_rad_s;   ///< feed-forward kappa U: the yaw rate that follows a curved path
+  Scalar heading_rad = Scalar(0);  ///< psi_ref, in (-pi, pi]; a course where the law says so
+  Scalar rate_rad_s = Scalar(0);  ///< feed-forward kappa U: the yaw rate that follows a curved path
 };
 
 template <class Derived, class Scalar_>
