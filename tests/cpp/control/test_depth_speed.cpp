@@ -45,7 +45,7 @@ TEST_CASE_TEMPLATE("speed, depth and pitch: their laws, step by step", Scalar, f
   for (int k = 0; k < 10; ++k) {
     const double u = 1.4 + 0.02 * k, z = 5.2 - 0.03 * k, t = 0.01 * k - 0.05, q = 0.02 - 0.001 * k;
     REQUIRE(speed.update(Scalar(1.5), Scalar(u), Scalar(0.1), rev) == Status::kOk);
-    CHECK(std::fabs(double(rev) - (1.5 / 0.09994 + 5 * (1.5 - u) + speed_sum)) <
+    CHECK(std::fabs(double(rev) - (1.5 / 0.1 + 5 * (1.5 - u) + speed_sum)) <
           epsilon<Scalar>(64));
     speed_sum += 0.1 * (1.5 - u);
     REQUIRE(depth.update(5, Scalar(z), Scalar(0.1), theta) == Status::kOk);
@@ -97,7 +97,7 @@ double speed_recovery(double held_for) {
   double u = 0, last = 0;
   for (int k = 0; k < 3000; ++k) {
     REQUIRE(control.update(Scalar(1.5), Scalar(u), Scalar(0.1), rev) == Status::kOk);
-    for (int i = 0; i < 10; ++i) u += 0.01 * (double(rev) * 0.09994 - u) / 5;
+    for (int i = 0; i < 10; ++i) u += 0.01 * (double(rev) * 0.1 - u) / 5;
     if (std::fabs(u - 1.5) > 0.075) last = 0.1 * k;
   }
   CHECK(std::fabs(u - 1.5) < 1e-4);

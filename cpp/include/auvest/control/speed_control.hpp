@@ -17,7 +17,8 @@ class SpeedControl {
   using Scalar = Scalar_;
 
   struct Params {
-    Scalar advance_m = Scalar(0.09994);             ///< c [m/rev], > 0; of the torpedo `remus100`
+    /// c [m/rev], > 0; of the torpedo `remus100`, 0.09994 rounded: the integral takes the rest
+    Scalar advance_m = Scalar(0.1);
     Scalar proportional = Scalar(5);                ///< Kp [rev/s per m/s], >= 0
     Scalar integral = Scalar(1);                    ///< Ki [rev/s per m], >= 0
     Scalar max_rev_s = Scalar(25.416666666666668);  ///< n_max, > 0; 1525 rpm
