@@ -182,6 +182,9 @@ class Waypoints {
     return Status::kOk;
   }
 
+  /// Where (x, y) [m] is beside the leg or arc as it is, without a switch; as locate() otherwise.
+  PathPoint<Scalar> beside(Scalar x, Scalar y) const { return here(x, y); }
+
   const PlanReport& report() const { return report_; }  ///< on the plan that start() saw last
   std::uint16_t leg() const { return leg_; }  ///< from 0; an arc belongs to the leg before
   bool on_arc() const { return where_ == Where::kArc; }
