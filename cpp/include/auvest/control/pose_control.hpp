@@ -67,7 +67,7 @@ class PoseControl {
     }
     if (dt < Scalar(0)) return Status::kTimeBackwards;
     if (math::absolute(math::wrap(pose(4))) > Scalar(1.3962634015954636))
-      return Status::kBadParameter;
+      return Status::kSteepPitch;
     Vector6 error;
     Vector6 pull;  // Kp e + Ki int e
     for (int i = 0; i < 6; ++i) {
