@@ -28,7 +28,8 @@ AUVEST_OUTLINE AUVEST_INLINE void cross_flow_integrals(Scalar length, const Valu
   i0 = a * a + b * b * Value(third);
   i1 = ab * Value(third);
   const math::Mask<Value> turning = a < b;
-  if (math::any(turning)) {
+  using math::any;  // or that of a batch's mask
+  if (any(turning)) {
     const Value q = a / math::select(turning, b, Value(1));
     const Value qq = q * q;
     const Value bent = Value(0.125) + qq * (Value(0.25) - qq * Value(Scalar(1) / Scalar(24)));

@@ -169,7 +169,7 @@ class Hull {
   /// d(nu_r)/dt from the velocities through the water and the state of the actuators.
   template <class Value>
   AUVEST_OUTLINE AUVEST_INLINE void acceleration(const Attitude<Value>& a, const Value* velocities,
-                                                 const Value* actuators, Value* rate) const {
+                                                 const Value* actuators, Value* result) const {
     Value tau[6];
     forces(a, velocities, actuators, tau);
     AUVEST_UNROLL
@@ -180,7 +180,7 @@ class Hull {
         if (inverse_(i, j) == Scalar(0)) continue;
         sum = sum + Value(inverse_(i, j)) * tau[Freedom::axis(j)];
       }
-      rate[i] = sum;  // [AUKF 3]
+      result[i] = sum;  // [AUKF 3]
     }
   }
 

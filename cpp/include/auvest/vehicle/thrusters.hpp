@@ -106,13 +106,13 @@ struct Thrusters {
   }
 
  private:
-  static typename Lag<Scalar>::Params lag_params(const Params& p, const Curve& curve) {
-    typename Lag<Scalar>::Params lag;
-    lag.low = curve.lowest();
-    lag.high = curve.highest();
-    lag.time_constant_s = p.time_constant_s;
-    lag.rate_limit = p.rate_limit_n_s;
-    return lag;
+  static typename Lag<Scalar>::Params lag_params(const Params& p, const Curve& reach) {
+    typename Lag<Scalar>::Params of_thrust;
+    of_thrust.low = reach.lowest();
+    of_thrust.high = reach.highest();
+    of_thrust.time_constant_s = p.time_constant_s;
+    of_thrust.rate_limit = p.rate_limit_n_s;
+    return of_thrust;
   }
 
   Matrix6 matrix_;
