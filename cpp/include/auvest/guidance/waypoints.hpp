@@ -264,8 +264,8 @@ class Waypoints {
       }
       return;
     }
-    const bool round = where_ == Where::kLeg && turn_ != Scalar(0);
-    if (round &&
+    const bool rounded = where_ == Where::kLeg && turn_ != Scalar(0);
+    if (rounded &&
         arc_.leave(corner.x_m - lead_ * line_.cosine(), corner.y_m - lead_ * line_.sine(),
                    line_.sine(), line_.cosine(), turn_ < Scalar(0) ? -params_.arc_m : params_.arc_m,
                    turn_ < Scalar(0) ? -turn_ : turn_) == Status::kOk) {
