@@ -362,8 +362,10 @@ void check_refusals() {
   REQUIRE(control.restart(Scalar(0.25)) == Status::kOk);
   Scalar rudder = 7;
   const auto good = reference_at<Scalar>(0);
-  CHECK(control.update(reference_at<Scalar>(NAN), 0, 0, 1, 1, rudder) == Status::kNotFinite);
-  CHECK(control.update(reference_at<Scalar>(0, NAN), 0, 0, 1, 1, rudder) == Status::kNotFinite);
+  CHECK(control.update(reference_at<Scalar>(std::nan("")), 0, 0, 1, 1, rudder) ==
+        Status::kNotFinite);
+  CHECK(control.update(reference_at<Scalar>(0, std::nan("")), 0, 0, 1, 1, rudder) ==
+        Status::kNotFinite);
   CHECK(control.update(good, nan, 0, 1, 1, rudder) == Status::kNotFinite);
   CHECK(control.update(good, 0, nan, 1, 1, rudder) == Status::kNotFinite);
   CHECK(control.update(good, 0, 0, nan, 1, rudder) == Status::kNotFinite);
