@@ -78,8 +78,8 @@ TEST_CASE_TEMPLATE(
   nu.setZero();
   g.setZero();
   wanted(5) = Scalar(-3);
-  double yaw = 3, rate = 0, integral = 0;  // 0.2832 rad to go, through pi
-  double model[3] = {0, 6 - 2 * kPi, 0};   // int e, e, e'
+  double yaw = 3, rate = 0;               // 0.2832 rad to go, through pi
+  double model[3] = {0, 6 - 2 * kPi, 0};  // int e, e, e'
   for (int k = 0; k < 5000; ++k) {
     eta(5) = Scalar(std::remainder(yaw, 2 * kPi));
     nu(5) = Scalar(rate);
@@ -90,7 +90,6 @@ TEST_CASE_TEMPLATE(
     model[0] += 1e-3 * model[1];
     model[1] += 1e-3 * model[2];
     model[2] += 1e-3 * second;
-    integral += 1e-3 * model[1];
   }
   CHECK(std::fabs(yaw - (2 * kPi - 3) - model[1]) < (sizeof(Scalar) == 4 ? 1e-5 : 1e-10));
 }
