@@ -75,6 +75,26 @@ TEST_CASE("mission: arcs that the hull can fly take the corners out of the error
   CHECK(smooth.all_rms_m < 0.4 * sharp.all_rms_m);
 }
 
+TEST_CASE(
+    "mission: a course steered as a heading rests beside the line, the other laws come to it") {
+  // A current across the lanes: e = Delta tan(crab), and for the vector field, whose slope at the
+  // line is the same, tan(crab) / k, with sin(crab) = 0.3 / 1.5.
+  MissionScenario s = mission_source(MissionSource::kTruth, MissionTrack::kLawnmower);
+  s.current_rad = 90 * kDegree;
+  const double beside = 10 * std::tan(std::asin(0.2));
+  for (const auto law : {MissionGuidance::kLineOfSight, MissionGuidance::kVectorField}) {
+    s.guidance = law;
+    const MissionResult r = fly_mission<double>(s, 1, 0);
+    REQUIRE(r.status == Status::kOk);
+    CHECK(r.finished);
+    CHECK(r.settled_rms_m == doctest::Approx(beside).epsilon(0.05));
+  }
+  s.guidance = MissionGuidance::kIntegral;
+  const MissionResult r = fly_mission<double>(s, 1, 0);
+  REQUIRE(r.status == Status::kOk);
+  CHECK(r.settled_rms_m < 0.5 * beside);
+}
+
 TEST_CASE("mission: fewer degrees of freedom fly the same plan") {
   // The planar hull lacks the roll that lowers the sway inertia by 4 %: close, not equal.
   MissionScenario s = mission_source(MissionSource::kTruthCrab, MissionTrack::kCircle);
