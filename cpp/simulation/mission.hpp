@@ -1,0 +1,446 @@
+// The closed loop of a vehicle: sensors, estimate, guidance, control, actuators, hull, in turn.
+//
+// Order within a step, 10 times a second: the sensors read; the estimate is predicted and what has
+// arrived corrects it; guidance switches the leg and says what to steer; control commands the
+// actuators; the command is held while the hull moves on. Between fixes guidance runs on the
+// predicted estimate.
+//
+// The vehicle's own part (estimate, guidance, control) is computed in `Scalar`; hull, sensors and
+// the judgement of the run are in double, on the desk.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+
+#include "auvest/control/autopilot.hpp"
+#include "auvest/control/heading_filter.hpp"
+#include "auvest/guidance/guidance_law.hpp"
+#include "auvest/guidance/path_point.hpp"
+#include "auvest/math/angle.hpp"
+#include "auvest/math/random.hpp"
+#include "auvest/math/trigonometry.hpp"
+#include "auvest/status.hpp"
+#include "auvest/types.hpp"
+#include "auvest/vehicle/integrate.hpp"
+#include "auvest/vehicle/remus100.hpp"
+#include "simulation/mission_navigators.hpp"
+#include "simulation/mission_scenario.hpp"
+#include "simulation/mission_track.hpp"
+#include "simulation/vehicle_sensors.hpp"
+
+namespace auvest {
+
+/// What became of a run.
+struct MissionResult {
+  Status status = Status::kOk;
+  bool finished = false;  ///< the track was flown to its end
+  double duration_s = 0;
+  double settled_rms_m = 0;        ///< cross-track, beside the active leg
+  double all_rms_m = 0;            ///< corners too
+  double position_rms_m = 0;       ///< of the estimate
+  double interval_s = 0;           ///< mean between fixes
+  double rudder_travel_rad_s = 0;  ///< mean |change| of the rudder's command
+  std::uint32_t fixes = 0;
+  std::uint32_t refused = 0;  ///< fixes that the filter did not take
+};
+
+/// One step, after its command.
+struct MissionStep {
+  const VehicleTruth& truth;
+  double current_m_s[2];
+  std::uint32_t leg;
+  bool settled;
+  double cross_m;        ///< of the vehicle
+  double estimate_m[2];  ///< position that guidance ran on
+  double estimate_current_m_s[2];
+  double command[3];     ///< rudder [rad], stern planes [rad], propeller [rev/s]
+  double interval_s;     ///< to the next fix
+  bool fixed;            ///< a fix was taken in this step
+  double nis;            ///< of that fix
+  double nees_position;  ///< of the estimate, 2 on average; NaN without a filter
+  double nees;           ///< of all states that the truth has: 4 on average; NaN without
+};
+
+namespace detail {
+
+/// A hull in these degrees of freedom, as the sensors see it. What is not free stays where it was.
+template <class Freedom>
+class MissionHull {
+ public:
+  using Body = Hull<Torpedo<double>, Freedom>;
+
+  MissionHull(const double* position, double depth, double heading, double speed,
+              const double* stream)
+      : body_(remus100<double>()) {
+    math::set_zero(state_);
+    current_(0) = stream[0];
+    current_(1) = stream[1];
+    current_(2) = 0;
+    truth_.pose[0] = position[0];
+    truth_.pose[1] = position[1];
+    truth_.pose[2] = depth;
+    truth_.pose[5] = heading;
+    truth_.water[0] = speed;
+    constexpr int n = Body::kVelocities;
+    for (int i = 0; i < n; ++i) {
+      state_(i) = truth_.pose[Freedom::axis(i)];
+      state_(n + i) = truth_.water[Freedom::axis(i)];
+    }
+    state_(2 * n + kPropeller) = 15;  // 900 rpm
+    read();
+  }
+
+  const VehicleTruth& truth() const { return truth_; }
+
+  void set_current(const double* stream) {
+    current_(0) = stream[0];
+    current_(1) = stream[1];
+  }
+
+  Status advance(const double* command, double dt, double time_s) {
+    typename Body::Command c;
+    for (int i = 0; i < 3; ++i) c(i) = command[i];
+    const Status status = auvest::advance<Rk4>(body_, state_, c, current_, dt);
+    truth_.time_s = time_s;
+    read();
+    return status;
+  }
+
+ private:
+  void read() {
+    constexpr int n = Body::kVelocities;
+    const typename Body::Velocity over_ground = body_.ground_velocity(state_, current_);
+    typename Body::State rates;
+    body_.pose_rate(Body::attitude(state_), state_, current_, rates);
+    for (int i = 0; i < n; ++i) {
+      const int axis = Freedom::axis(i);
+      truth_.pose[axis] = state_(i);
+      truth_.water[axis] = state_(n + i);
+      truth_.ground[axis] = over_ground(i);
+      if (axis < 3) truth_.velocity[axis] = rates(i);
+    }
+  }
+
+  Body body_;
+  typename Body::State state_;
+  typename Body::Current current_;
+  VehicleTruth truth_;
+};
+
+/// Sum of squares and their number.
+struct SquareMean {
+  double sum = 0;
+  std::uint32_t count = 0;
+
+  void add(double square) {
+    sum += square;
+    ++count;
+  }
+  double root() const { return count > 0 ? math::sqrt(sum / count) : 0.0; }
+};
+
+/// The instruments on board and what the vehicle makes of them: the readings of its controllers,
+/// and what drives the model-aided filter.
+template <class Scalar>
+class MissionSensors {
+ public:
+  AutopilotReadings<Scalar> now;
+  Vector<Scalar, 3> input;  ///< speed ahead and to starboard through the water, heading
+
+  MissionSensors(const MissionScenario& s, std::uint64_t seed, std::uint64_t stream)
+      : compass_(s.compass, each(s), math::Random(seed, stream + 1)),
+        gyro_(s.gyro, each(s), math::Random(seed, stream + 2)),
+        depth_(s.depth, each(s), math::Random(seed, stream + 3)),
+        log_(s.log, each(s), math::Random(seed, stream + 4)) {
+    math::set_zero(input);
+  }
+
+  /// The truth, as it is.
+  void take(const VehicleTruth& truth) {
+    now.heading_rad = Scalar(math::wrap(truth.pose[5]));
+    now.yaw_rate_rad_s = Scalar(truth.ground[5]);
+    now.pitch_rad = Scalar(truth.pose[4]);
+    now.pitch_rate_rad_s = Scalar(truth.ground[4]);
+    now.speed_m_s = Scalar(truth.water[0]);
+    now.depth_m = Scalar(truth.pose[2]);
+  }
+
+  /// What the instruments say of it, dt seconds after the last time.
+  void read(const VehicleTruth& truth, Scalar dt) {
+    compass_.sample(truth);
+    gyro_.sample(truth);
+    depth_.sample(truth);
+    log_.sample(truth);
+    now.pitch_rad = Scalar(truth.pose[4]);
+    Reading<3> rates;
+    while (gyro_.take(truth.time_s, rates)) {
+      now.pitch_rate_rad_s = Scalar(rates.value[1]);
+      now.yaw_rate_rad_s = Scalar(rates.value[2]);
+    }
+    heading_.predict(now.yaw_rate_rad_s, dt);
+    Reading<1> number;
+    while (compass_.take(truth.time_s, number)) {
+      const Scalar psi = Scalar(number.value[0]);
+      if (heading_.initialised()) {
+        heading_.update(psi);
+      } else {
+        heading_.restart(psi);
+      }
+    }
+    now.heading_rad = heading_.heading_rad();
+    while (depth_.take(truth.time_s, number)) now.depth_m = Scalar(number.value[0]);
+    Reading<2> speeds;
+    while (log_.take(truth.time_s, speeds)) {
+      now.speed_m_s = Scalar(speeds.value[0]);
+      input(0) = Scalar(speeds.value[0]);
+      input(1) = Scalar(speeds.value[1]);
+    }
+    input(2) = now.heading_rad;
+  }
+
+ private:
+  static SensorTiming each(const MissionScenario& s) {
+    SensorTiming timing;
+    timing.period_s = s.period_s;
+    return timing;
+  }
+
+  VehicleSensor<CompassDevice> compass_;
+  VehicleSensor<GyroDevice> gyro_;
+  VehicleSensor<DepthDevice> depth_;
+  VehicleSensor<LogDevice> log_;
+  HeadingFilter<Scalar> heading_;
+};
+
+/// The current of a run: constant, or a random walk.
+class MissionCurrent {
+ public:
+  MissionCurrent(const MissionScenario& s, double drawn_rad, const math::Random& random)
+      : random_(random), step_(math::sqrt(s.current_walk * s.period_s)) {
+    if (step_ > 0) {
+      random_.normal_pair(value[0], value[1]);
+      for (double& component : value) component *= s.current_sigma_m_s;
+      return;
+    }
+    const double towards = s.current_rad == s.current_rad ? s.current_rad : drawn_rad;
+    value[0] = s.current_m_s * math::cos(towards);
+    value[1] = s.current_m_s * math::sin(towards);
+  }
+
+  double value[2];  ///< north, east [m/s]
+
+  void advance() {
+    if (!(step_ > 0)) return;
+    double push[2];
+    random_.normal_pair(push[0], push[1]);
+    for (int i = 0; i < 2; ++i) value[i] += step_ * push[i];
+  }
+
+ private:
+  math::Random random_;
+  double step_;
+};
+
+/// What is summed up over a run.
+class MissionTally {
+ public:
+  void add(bool settled, double cross_m, double position_error_squared, double rudder_rad) {
+    if (settled) settled_.add(cross_m * cross_m);
+    all_.add(cross_m * cross_m);
+    position_.add(position_error_squared);
+    travel_ += math::absolute(rudder_rad - rudder_);
+    rudder_ = rudder_rad;
+  }
+
+  void report(double duration_s, MissionResult& result) const {
+    result.duration_s = duration_s;
+    result.settled_rms_m = settled_.root();
+    result.all_rms_m = all_.root();
+    result.position_rms_m = position_.root();
+    result.interval_s = result.fixes > 0 ? duration_s / result.fixes : 0.0;
+    result.rudder_travel_rad_s = duration_s > 0 ? travel_ / duration_s : 0.0;
+  }
+
+ private:
+  SquareMean settled_, all_, position_;
+  double rudder_ = 0;
+  double travel_ = 0;
+};
+
+template <class Scalar, class Freedom, class Navigator, class Sink>
+MissionResult fly_with(const MissionScenario& s, std::uint64_t seed, std::uint32_t run,
+                       Sink& sink) {
+  MissionResult result;
+  const std::uint64_t stream = 16 * static_cast<std::uint64_t>(run);
+  math::Random world(seed, stream);
+  const double drawn = math::two_pi<double>() * world.uniform<double>();
+  double error[2];
+  world.normal_pair(error[0], error[1]);
+  MissionCurrent stream_of(s, drawn, math::Random(seed, stream + 6));
+  const double* const current = stream_of.value;
+
+  MissionPath<Scalar> path(s);
+  double start[2];
+  double heading = 0;
+  path.start(start, heading);
+  MissionHull<Freedom> hull(start, s.depth_m, heading, s.speed_m_s, current);
+  const bool exact = s.estimate == MissionEstimate::kTruth;
+  MissionSensors<Scalar> sensors(s, seed, stream);
+  VehicleSensor<UsblDevice> usbl(s.usbl, s.usbl_timing, math::Random(seed, stream + 5));
+
+  double guess[2];
+  for (int i = 0; i < 2; ++i) guess[i] = start[i] + (exact ? 0.0 : s.initial_error_m * error[i]);
+  Navigator navigator(s, guess, heading);
+  MissionLaw<Scalar> law(s);
+  Autopilot<Scalar> autopilot;
+  const bool blind = s.guidance == MissionGuidance::kCrab &&
+                     s.estimate != MissionEstimate::kTruth &&
+                     s.estimate != MissionEstimate::kModelAided;
+  result.status = !math::is_positive(s.period_s) || blind ? Status::kBadParameter : path.check();
+  if (result.status == Status::kOk) result.status = navigator.check();
+  if (result.status == Status::kOk) result.status = autopilot.restart(Scalar(heading));
+  if (result.status != Status::kOk) return result;
+
+  const Scalar dt = Scalar(s.period_s);
+  const Scalar speed = Scalar(s.speed_m_s);
+  const auto steps_of = [&](Scalar interval) {
+    const double steps = static_cast<double>(interval) / s.period_s + 0.5;
+    return steps < 1 ? std::uint32_t(1) : static_cast<std::uint32_t>(steps);
+  };
+  std::uint32_t asked = 0;
+  std::uint32_t next = steps_of(navigator.interval());
+  MissionTally tally;
+  std::uint32_t k = 0;
+  for (;; ++k) {
+    const VehicleTruth& truth = hull.truth();
+    const double most = s.track == MissionTrack::kCircle ? s.circle_s : s.most_s;
+    if (truth.time_s >= most - 1e-9) break;
+
+    // The sensors read.
+    if (exact) {
+      sensors.take(truth);
+    } else {
+      sensors.read(truth, dt);
+    }
+
+    // Predict and correct.
+    bool fixed = false;
+    if (exact) {
+      navigator.x = Scalar(truth.pose[0]);
+      navigator.y = Scalar(truth.pose[1]);
+      navigator.current[0] = Scalar(current[0]);
+      navigator.current[1] = Scalar(current[1]);
+    } else {
+      if (k > 0) result.status = navigator.predict(dt, sensors.input);
+      if (result.status != Status::kOk) return result;
+      if (k >= next) {
+        usbl.ask(truth);
+        asked = k;
+        next = k + steps_of(navigator.interval());
+      }
+      Reading<2> fix;
+      while (usbl.take(truth.time_s, fix)) {
+        Vector<Scalar, 2> z;
+        z(0) = Scalar(fix.value[0]);
+        z(1) = Scalar(fix.value[1]);
+        const double age = truth.time_s - fix.valid_s;
+        const Status status = navigator.update(z, s.usbl, Scalar(age > 0 ? age : 0));
+        if (status != Status::kOk) {
+          ++result.refused;
+          continue;
+        }
+        fixed = true;
+        ++result.fixes;
+        double desired[2];
+        path.desired(s.speed_m_s * truth.time_s, desired);
+        Vector<Scalar, 2> reference;
+        reference(0) = Scalar(desired[0]);
+        reference(1) = Scalar(desired[1]);
+        result.status = navigator.feedback(reference);
+        if (result.status != Status::kOk) return result;
+        next = asked + steps_of(navigator.interval());
+        if (next <= k) next = k + 1;
+      }
+    }
+
+    // Guidance and control.
+    PathPoint<Scalar> point;
+    result.status = path.locate(navigator.x, navigator.y, point);
+    if (result.status != Status::kOk) return result;
+    if (path.over()) {
+      result.finished = true;
+      break;
+    }
+    GuidanceCommand<Scalar> wanted;
+    TorpedoCommand<Scalar> out;
+    result.status = law.update(point, navigator.current, speed, dt, wanted);
+    if (result.status != Status::kOk) return result;
+    result.status = autopilot.update(wanted, speed, Scalar(s.depth_m), sensors.now, dt, out);
+    if (result.status != Status::kOk) return result;
+
+    // The judgement of this step.
+    const PathPoint<double> flown = path.judge(truth.pose);
+    const bool calm = s.track == MissionTrack::kCircle ? truth.time_s > s.settled_circle_s + 1e-9
+                                                       : flown.along_m >= s.settled_leg_m;
+    const double ex = static_cast<double>(navigator.x) - truth.pose[0];
+    const double ey = static_cast<double>(navigator.y) - truth.pose[1];
+    const double command[3] = {static_cast<double>(out.rudder_rad),
+                               static_cast<double>(out.stern_planes_rad),
+                               static_cast<double>(out.propeller_rev_s)};
+    tally.add(calm, flown.cross_m, ex * ex + ey * ey, command[0]);
+    MissionStep step = {
+        truth,
+        {current[0], current[1]},
+        path.leg(),
+        calm,
+        flown.cross_m,
+        {static_cast<double>(navigator.x), static_cast<double>(navigator.y)},
+        {static_cast<double>(navigator.current[0]), static_cast<double>(navigator.current[1])},
+        {command[0], command[1], command[2]},
+        static_cast<double>(navigator.interval()),
+        fixed,
+        fixed ? navigator.nis : std::numeric_limits<double>::quiet_NaN(),
+        0,
+        0};
+    navigator.judge(truth, current, step.nees_position, step.nees);
+    sink(static_cast<const MissionStep&>(step));
+
+    stream_of.advance();
+    hull.set_current(current);
+    result.status = hull.advance(command, s.period_s, (k + 1) * s.period_s);
+    if (result.status != Status::kOk) return result;
+  }
+  result.finished = result.finished || s.track == MissionTrack::kCircle;
+  tally.report(k * s.period_s, result);
+  return result;
+}
+
+}  // namespace detail
+
+/// Flies run number `run` of a scenario in these degrees of freedom and hands every step to
+/// `sink(step)`. The same seed and run give the same current, compass, noise and initial error
+/// whatever the scenario. The result's status is kOk, or the first that is not: the run ends there.
+template <class Scalar, class Freedom = SixDof, class Sink>
+MissionResult fly_mission(const MissionScenario& scenario, std::uint64_t seed, std::uint32_t run,
+                          Sink&& sink) {
+  switch (scenario.estimate) {
+    case MissionEstimate::kUkf:
+      return detail::fly_with<Scalar, Freedom, detail::UkfNavigator<Scalar>>(scenario, seed, run,
+                                                                             sink);
+    case MissionEstimate::kModelAided:
+      return detail::fly_with<Scalar, Freedom, detail::ModelAidedNavigator<Scalar>>(scenario, seed,
+                                                                                    run, sink);
+    case MissionEstimate::kTruth:
+    case MissionEstimate::kFixes:
+      break;
+  }
+  return detail::fly_with<Scalar, Freedom, detail::FixNavigator<Scalar>>(scenario, seed, run, sink);
+}
+
+/// The same without a look at the steps.
+template <class Scalar, class Freedom = SixDof>
+MissionResult fly_mission(const MissionScenario& scenario, std::uint64_t seed, std::uint32_t run) {
+  return fly_mission<Scalar, Freedom>(scenario, seed, run, [](const MissionStep&) {});
+}
+
+}  // namespace auvest
