@@ -12,7 +12,9 @@ void bind_status(py::module_& m) {
       .value("bad_parameter", Status::kBadParameter)
       .value("not_positive_definite", Status::kNotPositiveDefinite)
       .value("alpha_too_small", Status::kAlphaTooSmall)
-      .value("overflow", Status::kOverflow);
+      .value("overflow", Status::kOverflow)
+      .value("unstable_step", Status::kUnstableStep)
+      .value("steep_pitch", Status::kSteepPitch);
   m.def("describe", &describe, py::arg("status"), "One line of English for a status.");
 
   static py::exception<StatusError> error(m, "StatusError", PyExc_ValueError);

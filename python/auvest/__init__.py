@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from auvest.models import RangeBearing as RangeBearing
     from auvest.models import RangeBearingElevation as RangeBearingElevation
     from auvest.models import SpeedHeading as SpeedHeading
+    from auvest.models import SpeedHeadingCurrent as SpeedHeadingCurrent
     from auvest.models import WhiteAcceleration as WhiteAcceleration
     from auvest.models.library import load_models as load_models
     from auvest.slat import UNKNOWN_MASTER as UNKNOWN_MASTER
@@ -119,6 +120,7 @@ else:
         "SlatfJoint": "slat",
         "Sonar": "slat.models",
         "SpeedHeading": "models",
+        "SpeedHeadingCurrent": "models",
         "Status": "_core",
         "UNKNOWN_MASTER": "slat",
         "Ukf": "filters",

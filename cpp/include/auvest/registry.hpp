@@ -16,6 +16,7 @@
 #include "auvest/models/range_bearing.hpp"
 #include "auvest/models/range_bearing_elevation.hpp"
 #include "auvest/models/speed_heading.hpp"
+#include "auvest/models/speed_heading_current.hpp"
 #include "auvest/models/white_acceleration.hpp"
 
 #define AUVEST_PROCESSES(X)                                    \
@@ -25,6 +26,7 @@
   X("SpeedHeadingBias", SpeedHeading<Scalar, true>)            \
   X("SpeedHeadingScale", SpeedHeading<Scalar, false, true>)    \
   X("SpeedHeadingBiasScale", SpeedHeading<Scalar, true, true>) \
+  X("SpeedHeadingCurrent", SpeedHeadingCurrent<Scalar>)        \
   X("Odometry", Odometry<Scalar>)                              \
   X("WhiteAcceleration2", WhiteAcceleration<Scalar, 2>)        \
   X("WhiteAcceleration3", WhiteAcceleration<Scalar, 3>)

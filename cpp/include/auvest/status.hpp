@@ -13,9 +13,11 @@ enum class Status : std::uint8_t {
   kNotFinite,            ///< an argument is NaN or infinite
   kTimeBackwards,        ///< dt < 0
   kBadParameter,         ///< a parameter lies outside its stated range
-  kNotPositiveDefinite,  ///< P or R is not symmetric positive definite
+  kNotPositiveDefinite,  ///< P, R or a hull's M is not symmetric positive definite
   kAlphaTooSmall,        ///< alpha cancels all digits of a model without closed-form deviations
-  kOverflow              ///< the result would not be finite
+  kOverflow,             ///< the result would not be finite
+  kUnstableStep,         ///< the time step is longer than the hull's largest stable one
+  kSteepPitch            ///< pitch is beyond 80 degrees, where Euler angles fail
 };
 
 /// One line of English for each status, without a full stop.
@@ -32,11 +34,15 @@ inline const char* describe(Status status) {
     case Status::kBadParameter:
       return "a parameter lies outside its stated range";
     case Status::kNotPositiveDefinite:
-      return "the covariance is not symmetric positive definite";
+      return "the covariance, or a hull's mass matrix, is not symmetric positive definite";
     case Status::kAlphaTooSmall:
       return "alpha is too small for a model without closed-form deviations in this precision";
     case Status::kOverflow:
       return "the result would not be finite";
+    case Status::kUnstableStep:
+      return "the time step is longer than the largest stable one";
+    case Status::kSteepPitch:
+      return "pitch is beyond 80 degrees, where Euler angles fail";
   }
   return "unknown status";
 }

@@ -15,12 +15,19 @@ from auvest.models.position import Position
 from auvest.models.range_bearing import RangeBearing
 from auvest.models.range_bearing_elevation import RangeBearingElevation
 from auvest.models.speed_heading import SpeedHeading
+from auvest.models.speed_heading_current import SpeedHeadingCurrent
 from auvest.models.white_acceleration import WhiteAcceleration
 
 #: Every process and every sensor, by the name of its class.
 PROCESSES: dict[str, type[ProcessModel]] = {
     model.__name__: model
-    for model in (ConstantAcceleration, Odometry, SpeedHeading, WhiteAcceleration)
+    for model in (
+        ConstantAcceleration,
+        Odometry,
+        SpeedHeading,
+        SpeedHeadingCurrent,
+        WhiteAcceleration,
+    )
 }
 SENSORS: dict[str, type[MeasurementModel]] = {
     model.__name__: model
@@ -71,6 +78,7 @@ __all__ = [
     "RangeBearing",
     "RangeBearingElevation",
     "SpeedHeading",
+    "SpeedHeadingCurrent",
     "WhiteAcceleration",
     "from_description",
 ]

@@ -25,6 +25,7 @@
 #include "auvest/models/range_bearing.hpp"
 #include "auvest/models/range_bearing_elevation.hpp"
 #include "auvest/models/speed_heading.hpp"
+#include "auvest/models/speed_heading_current.hpp"
 #include "auvest/models/white_acceleration.hpp"
 
 namespace {
@@ -293,6 +294,7 @@ TEST_CASE("process models") {
   check_process(driven(auvest::SpeedHeading<double, true>()), 0.5);
   check_process(driven(auvest::SpeedHeading<double, false, true>()), 0.5);
   check_process(driven(auvest::SpeedHeading<double, true, true>()), 0.5);
+  check_process(driven(auvest::SpeedHeadingCurrent<double>()), 0.5);
   check_process(driven(auvest::Odometry<double>()), 0.5);
   check_process(drifting<double, 2>(), 0.7);
   check_process(drifting<double, 3>(), 0.7);
@@ -364,6 +366,7 @@ TEST_CASE("position_variance is the trace that propagate would give") {
   check_position_variance<2>(auvest::EulerAcceleration<double>());
   check_position_variance<2>(auvest::ExactAcceleration<double>());
   check_position_variance<2>(drifting<double, 2>());
+  check_position_variance<2>(driven(auvest::SpeedHeadingCurrent<double>()));
   check_position_variance<3>(drifting<double, 3>());
 }
 
@@ -432,6 +435,43 @@ TEST_CASE("nearly constant velocity: z has a density of its own, and steps compo
   }
 }
 
+TEST_CASE("dead reckoning in a current: by hand, steps compose, and fixes find the current") {
+  auvest::SpeedHeadingCurrent<double> model;
+  model.input << 2, 0.5, auvest::math::half_pi<double>();  // east, starboard is south
+  Belief<double, 4> once;
+  once.x << 10, 20, 0.25, -0.125;
+  once.P = Matrix<double, 4, 4>::Identity();
+  Belief<double, 4> twice = once;
+  model.propagate(once, 4);
+  CHECK(once.x(0) == close_to(10 + 4 * (-0.5 + 0.25), 1e-14));
+  CHECK(once.x(1) == close_to(20 + 4 * (2 - 0.125), 1e-14));
+  CHECK(once.x(2) == 0.25);
+  CHECK(once.x(3) == -0.125);
+  // Position noise q dt and the walk of the current, q_c (dt^3/3, dt^2/2, dt).
+  CHECK(once.P(0, 0) == close_to(1 + 16 + 0.004 * 4 + 1e-5 * 64 / 3, 1e-14));
+  CHECK(once.P(2, 0) == close_to(4 + 1e-5 * 16 / 2, 1e-14));
+  CHECK(once.P(2, 2) == close_to(1 + 1e-5 * 4, 1e-14));
+  model.propagate(twice, 1.5);
+  model.propagate(twice, 2.5);
+  for (int i = 0; i < 4; ++i) {
+    CHECK(twice.x(i) == close_to(once.x(i), 1e-14));
+    for (int j = 0; j <= i; ++j) CHECK(std::fabs(twice.P(i, j) - once.P(i, j)) < 1e-13);
+  }
+  // Noise-free fixes on a vehicle that turns: the current, of which nothing was known.
+  using Process = auvest::SpeedHeadingCurrent<double>;
+  auvest::Ekf<Process> filter{Process()};
+  Vector<double, 4> start(3, -2, 0, 0);
+  REQUIRE(filter.reset(start, Matrix<double, 4, 4>::Identity()) == auvest::Status::kOk);
+  Vector<double, 4> truth(0, 0, 0.25, -0.125);
+  for (int k = 0; k < 600; ++k) {
+    model.input << 1.5, 0.1, 0.01 * k;
+    truth = model.f(truth, 0.5);
+    REQUIRE(filter.predict(0.5, model.input) == auvest::Status::kOk);
+    REQUIRE(filter.update(truth.head<2>(), fix<double, 4, 2>()).status == auvest::Status::kOk);
+  }
+  CHECK((filter.x() - truth).norm() < 1e-3);
+}
+
 template <class Scalar>
 void check_circle(double tolerance) {
   // 5 m/s on a circle of 20 m about (0, 0), counter-clockwise and clockwise.
@@ -472,6 +512,7 @@ TEST_CASE("position: the textbook's update, with every process that begins with 
   check_textbook(auvest::Odometry<double>(), fix<double, 3, 2>());
   check_textbook(auvest::SpeedHeading<double, true, true>(), fix<double, 4, 2>());
   check_textbook(drifting<double, 2>(), fix<double, 4, 2>());
+  check_textbook(auvest::SpeedHeadingCurrent<double>(), fix<double, 4, 2>());
   check_textbook(auvest::ExactAcceleration<double>(), fix<double, 6, 2>());
   check_textbook(auvest::CoordinatedTurn<double>(), fix<double, 6, 2>());
   check_textbook(drifting<double, 3>(), fix<double, 6, 2>());

@@ -71,6 +71,13 @@ AUVEST_INLINE bool within(Scalar value, Scalar low, Scalar high) {
   return value >= low && value <= high;
 }
 
+/// The value, or the bound that it is beyond, for low <= high. Not a number counts as low.
+template <class Scalar>
+AUVEST_INLINE Scalar clamp(Scalar value, Scalar low, Scalar high) {
+  if (!(value > low)) return low;
+  return value > high ? high : value;
+}
+
 /// True if 0 <= value, and finite. (In parentheses: Arduino has macros min and max.)
 template <class Scalar>
 AUVEST_INLINE bool is_nonnegative(Scalar value) {
