@@ -48,6 +48,10 @@ COMMANDS: Mapping[tuple[str, ...], tuple[str, str]] = {
         "commands.simulate_mekf",
         "Simulate range-only cooperative localisation and show errors, weights and consistency.",
     ),
+    ("simulate", "mission"): (
+        "commands.simulate_mission",
+        "Simulate a vehicle that steers itself along a track by its own estimate.",
+    ),
     ("reproduce", "aukf"): (
         "reproduce.aukf.command",
         "Reproduce the AUKF paper (Deng, Yin, Duan 2019): Figs 1 to 10 and every claim.",
@@ -67,6 +71,10 @@ COMMANDS: Mapping[tuple[str, ...], tuple[str, str]] = {
     ("reproduce", "logs"): (
         "reproduce.logs.command",
         "Replay the validation recordings and set the errors beside the targets.",
+    ),
+    ("reproduce", "vehicle"): (
+        "reproduce.vehicle.command",
+        "Fly the vehicle that the AUKF paper describes: what each estimate is worth in the loop.",
     ),
     ("reproduce", "slat-cases"): (
         "reproduce.slat_cases.command",
@@ -103,6 +111,8 @@ First steps:
   auvest reproduce slatf             Table 1 and every figure of the paper beside ours
 
   auvest simulate mekf               ranges with outliers: EKF and robust kernels
+
+  auvest simulate mission            a torpedo steers itself by its own estimate
 
   auvest reproduce mekf              the M-estimation EKF paper beside ours
 
