@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from auvest import plots
-from auvest.reproduce.vehicle.measure import REFERENCE, Reproduction
+from auvest.reproduce.vehicle.measure import Reproduction
 from auvest.simulation import mission
 
 _SHOWN = {
@@ -34,9 +34,8 @@ def closed_loop(result: Reproduction) -> Figure:
             label="ours, with its standard error",
         )
         for place, row in zip(places, rows, strict=True):
-            known = REFERENCE.get((row.source, row.interval_s))
-            if known is not None:
-                value, error = known[track]["settled"]
+            if row.reference is not None:
+                value, error = row.reference["settled"]
                 panel.errorbar(value, place, xerr=error, fmt="|", color=plots.BLACK, markersize=12)
         panel.set_xlabel("m")
         panel.set_title(track, loc="left")
@@ -76,6 +75,6 @@ def tracks(result: Reproduction) -> Figure:
 
 
 FIGURES: Mapping[str, Callable[[Reproduction], Figure]] = {
-    "closed_loop.png": closed_loop,
-    "tracks.png": tracks,
+    "closed_loop": closed_loop,
+    "tracks": tracks,
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import isnan
 
 from auvest.reproduce import markdown
@@ -18,6 +19,7 @@ def page(result: measure.Reproduction) -> str:
         if not isnan(distance := row.distance(name))
     ]
     near = sum(distance <= 2 for distance in distances)
+    free = [check for check in result.checks if check.name.startswith("settled")]
     by_name = {(row.source, row.track, row.interval_s): row for row in result.rows}
     clean = by_name["robust_model_aided", "lawnmower", 0.5].settled.value
     dirty = by_name["robust_model_aided_outliers", "lawnmower", 0.5].settled.value
@@ -32,11 +34,14 @@ def page(result: measure.Reproduction) -> str:
         farthest=max(distances),
         checks=rows(
             (check.name, f"{check.value:.5f}", f"{check.expected:.5f}", "yes" if check.ok else "no")
-            for check in result.checks
+            for check in free
         ),
-        checked=len(result.checks),
+        checked=len(free),
         tolerance=measure.NOISE_FREE_TOLERANCE_M,
-        held=sum(check.ok for check in result.checks),
+        held=sum(check.ok for check in free),
+        runs_table=rows(_reference_rows(result)),
+        digits=len(result.checks) - len(free),
+        digits_held=sum(check.ok for check in result.checks) - sum(check.ok for check in free),
         robust=100 * (dirty / clean - 1),
         consistency=rows(
             (
@@ -70,17 +75,34 @@ def page(result: measure.Reproduction) -> str:
 
 def reference(row: measure.Row, name: str = "settled") -> str:
     """Print what the prototype gave."""
-    known = measure.REFERENCE.get((row.source, row.interval_s))
-    if known is None or isnan(known[row.track][name][0]):
+    known = row.reference
+    if known is None or isnan(known[name][0]):
         return "-"
-    value, error = known[row.track][name]
+    value, error = known[name]
     return f"{value:.3f}" if isnan(error) else f"{value:.3f} ± {error:.3f}"
+
+
+def _reference_rows(result: measure.Reproduction) -> Iterator[tuple[str, ...]]:
+    for name, run in measure.reference_runs().items():
+        mine = [check for check in result.checks if check.name.startswith(f"{name}, ")]
+        last = mine[-12:]
+        places = ", ".join(f"{check.value:.3f}" for check in last[:3])
+        wanted = ", ".join(f"{check.expected:.3f}" for check in last[:3])
+        held = f"{sum(check.ok for check in mine)} of {len(mine)}"
+        time = run["rows"][-1][0]
+        yield (name, run["vehicle"], run["what"], f"{time} s", places, wanted, held)
+
+
+def label(row: measure.Row) -> str:
+    """Name a row, with what it does not share with the others."""
+    prototype = row.model_position == measure.PROTOTYPE_POSITION
+    return row.source + (", Q of the prototype" if prototype else "")
 
 
 def _table(result: measure.Reproduction, track: str) -> str:
     return rows(
         (
-            f"`{row.source}`",
+            label(row),
             f"{row.mean_interval_s:.2f}" if row.mean_interval_s > 0 else "-",
             row.settled.text(3),
             reference(row),
