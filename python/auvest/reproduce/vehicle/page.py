@@ -46,6 +46,8 @@ def page(result: measure.Reproduction) -> str:
         consistency=rows(
             (
                 f"{c.bias_deg:g}",
+                f"{c.model_position:g}",
+                f"{c.model_current:g}",
                 f"{c.nees_position:.2f}",
                 f"{100 * c.nees_position_inside:.0f} %",
                 f"{c.nees:.2f}",
