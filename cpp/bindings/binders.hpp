@@ -32,6 +32,8 @@ void bind_intervals(py::module_& m);
 void bind_filters(py::module_& m);
 void bind_function_models(py::module_& m);
 void bind_cooperative(py::module_& m);
+void bind_mission(py::module_& m);
+void bind_vehicle(py::module_& m);
 void bind_tracking(py::module_& m);
 void bind_slat(py::module_& m);
 void bind_self_test(py::module_& m);

@@ -14,5 +14,7 @@ PYBIND11_MODULE(_core, m) {
   bind_tracking(m);
   bind_slat(m);
   bind_cooperative(m);
+  bind_mission(m);
+  bind_vehicle(m);
   bind_self_test(m);
 }

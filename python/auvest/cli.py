@@ -34,6 +34,9 @@ COMMANDS: Mapping[tuple[str, ...], str] = {
     ("simulate", "mekf"): (
         "Simulate range-only cooperative localisation and show errors, weights and consistency."
     ),
+    ("simulate", "mission"): (
+        "Simulate a vehicle that steers itself along a track by its own estimate."
+    ),
     ("reproduce", "aukf"): (
         "Reproduce the AUKF paper (Deng, Yin, Duan 2019): Figs 1 to 10 and every claim."
     ),
@@ -46,6 +49,9 @@ COMMANDS: Mapping[tuple[str, ...], str] = {
     ("reproduce", "intervals"): "Compare the interval policies at equal mean sampling rate.",
     ("reproduce", "logs"): (
         "Replay the validation recordings and set the errors beside the targets."
+    ),
+    ("reproduce", "vehicle"): (
+        "Fly the vehicle that the AUKF paper describes: what each estimate is worth in the loop."
     ),
     ("reproduce", "slat-cases"): (
         "Cases in which SlatfJoint and the IMM earn their place, and by how much."
@@ -141,6 +147,8 @@ def _main(
       auvest reproduce slatf             Table 1 and every figure of the paper beside ours
 
       auvest simulate mekf               ranges with outliers: EKF and robust kernels
+
+      auvest simulate mission            a torpedo steers itself by its own estimate
 
       auvest reproduce mekf              the M-estimation EKF paper beside ours
 

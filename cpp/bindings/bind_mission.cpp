@@ -1,0 +1,206 @@
+#include <array>
+#include <cmath>
+
+#include "binders.hpp"
+#include "simulation/mission.hpp"
+
+namespace auvest {
+namespace bindings {
+namespace {
+
+/// Names every number of a scenario.
+template <class Visitor>
+void visit_numbers(MissionScenario& s, Visitor&& v) {
+  v("period_s", s.period_s);
+  v("speed_m_s", s.speed_m_s);
+  v("depth_m", s.depth_m);
+  v("current_m_s", s.current_m_s);
+  v("current_rad", s.current_rad);
+  v("initial_error_m", s.initial_error_m);
+  v("compass_bias_rad", s.compass.bias_rad);
+  v("compass_noise_rad", s.compass.noise_rad);
+  v("gyro_noise_rad_s", s.gyro.noise_rad_s);
+  v("gyro_walk_rad_s", s.gyro.walk_rad_s);
+  v("depth_noise_m", s.depth.noise_m);
+  v("log_noise_m_s", s.log.noise_m_s);
+  v("log_scale", s.log.scale);
+  v("usbl_noise_m", s.usbl.noise_m);
+  v("usbl_noise_rad", s.usbl.noise_rad);
+  v("usbl_outliers", s.usbl.outliers);
+  v("usbl_outlier_m", s.usbl.outlier_m);
+  v("usbl_sound_m_s", s.usbl.sound_m_s);
+  v("usbl_latency_s", s.usbl_timing.latency_s);
+  v("usbl_dropout", s.usbl_timing.dropout);
+  v("acceleration_psd", s.acceleration_psd);
+  v("model_position", s.model.position);
+  v("model_current", s.model.current);
+  v("lookahead_m", s.lookahead_m);
+  v("switch_m", s.switch_m);
+  v("end_m", s.end_m);
+  v("arc_m", s.arc_m);
+  v("circle_s", s.circle_s);
+  v("most_s", s.most_s);
+}
+
+template <class Kind, std::size_t Count>
+Kind named(const py::dict& values, const char* name, const std::array<const char*, Count>& names) {
+  const auto given = values[name].cast<std::string>();
+  for (std::size_t i = 0; i < Count; ++i) {
+    if (given == names[i]) return static_cast<Kind>(i);
+  }
+  throw py::value_error(std::string(name) + " is not one of its names");
+}
+
+// In the order of the enumerations.
+const std::array<const char*, 2> kTracks = {"lawnmower", "circle"};
+const std::array<const char*, 4> kEstimates = {"truth", "fixes", "ukf", "model-aided"};
+const std::array<const char*, 5> kLaws = {"adaptive", "crab", "line-of-sight", "integral",
+                                          "vector-field"};
+
+MissionScenario to_scenario(const py::dict& values) {
+  MissionScenario s;
+  s.track = named<MissionTrack>(values, "track", kTracks);
+  s.estimate = named<MissionEstimate>(values, "estimate", kEstimates);
+  s.guidance = named<MissionGuidance>(values, "guidance", kLaws);
+  visit_numbers(
+      s, [&values](const char* name, double& value) { value = values[name].cast<double>(); });
+  s.interval = values["interval"].cast<AnyInterval<double>>();
+  s.kernel = values["kernel"].cast<AnyKernel<double>>();
+  const auto rejections = values["rejections"].cast<std::uint8_t>();
+  s.recovery.enabled = rejections > 0;
+  if (rejections > 0) s.recovery.streak.params.rejections = rejections;
+  return s;
+}
+
+template <class Scalar, class Sink>
+MissionResult fly(const MissionScenario& s, int freedom, std::uint64_t seed, std::uint32_t run,
+                  Sink& sink) {
+  switch (freedom) {
+    case 3:
+      return fly_mission<Scalar, ThreeDof>(s, seed, run, sink);
+    case 4:
+      return fly_mission<Scalar, FourDof>(s, seed, run, sink);
+    case 5:
+      return fly_mission<Scalar, FiveDof>(s, seed, run, sink);
+    default:
+      return fly_mission<Scalar, SixDof>(s, seed, run, sink);
+  }
+}
+
+/// Monte Carlo: run r draws from the streams of first_run + r of the seed, so the runs may be
+/// shared out to any number of threads. Of each run the first `rows` steps are kept; what lies
+/// behind its end is NaN.
+py::dict fly_missions(const py::dict& values) {
+  const MissionScenario scenario = to_scenario(values);
+  const bool single = values["dtype"].cast<std::string>() == "float32";
+  const auto freedom = values["freedom"].cast<int>();
+  const auto seed = values["seed"].cast<std::uint64_t>();
+  const auto first_run = values["first_run"].cast<std::uint32_t>();
+  const auto runs = values["runs"].cast<py::ssize_t>();
+  const auto rows = values["rows"].cast<py::ssize_t>();
+
+  // What is kept of each step, and of how many numbers it is.
+  enum Column {
+    kPose,
+    kWater,
+    kCross,
+    kEstimate,
+    kCurrent,
+    kCommand,
+    kInterval,
+    kNis,
+    kNeesPosition,
+    kNees,
+    kSettled,
+    kColumns
+  };
+  const std::array<const char*, kColumns> names = {
+      "pose",    "water",      "cross_m", "estimate_m",    "estimate_current_m_s",
+      "command", "interval_s", "nis",     "nees_position", "nees",
+      "settled"};
+  const std::array<py::ssize_t, kColumns> sizes = {6, 6, 1, 2, 2, 3, 1, 1, 1, 1, 1};
+  std::array<py::array_t<double>, kColumns> columns;
+  std::array<double*, kColumns> out{};
+  for (std::size_t c = 0; c < kColumns; ++c) {
+    const std::vector<py::ssize_t> flat{runs, rows};
+    const std::vector<py::ssize_t> deep{runs, rows, sizes[c]};
+    columns[c] = py::array_t<double>(sizes[c] == 1 ? flat : deep);
+    out[c] = columns[c].mutable_data();
+    std::fill_n(out[c], columns[c].size(), std::nan(""));
+  }
+  std::array<py::array_t<double>, 6> numbers;
+  const std::array<const char*, 6> of_run = {"duration_s",      "settled_rms_m",
+                                             "all_rms_m",       "position_rms_m",
+                                             "mean_interval_s", "rudder_travel_rad_s"};
+  for (auto& array : numbers) array = py::array_t<double>(runs);
+  py::array_t<std::int64_t> fixes(runs), refused(runs);
+  py::array_t<std::uint8_t> status(runs);
+  py::array_t<bool> finished(runs);
+  std::array<double*, 6> of_run_out{};
+  for (std::size_t i = 0; i < numbers.size(); ++i) of_run_out[i] = numbers[i].mutable_data();
+  auto* fixes_out = fixes.mutable_data();
+  auto* refused_out = refused.mutable_data();
+  auto* status_out = status.mutable_data();
+  auto* finished_out = finished.mutable_data();
+  {
+    py::gil_scoped_release release;
+    for (py::ssize_t run = 0; run < runs; ++run) {
+      py::ssize_t row = 0;
+      auto sink = [&](const MissionStep& step) {
+        if (row >= rows) return;
+        const auto put = [&](Column c, const double* from) {
+          const py::ssize_t size = sizes[c];
+          double* const to = out[c] + (run * rows + row) * size;
+          for (py::ssize_t i = 0; i < size; ++i) to[i] = from[i];
+        };
+        const double settled = step.settled ? 1.0 : 0.0;
+        put(kPose, step.truth.pose);
+        put(kWater, step.truth.water);
+        put(kCross, &step.cross_m);
+        put(kEstimate, step.estimate_m);
+        put(kCurrent, step.estimate_current_m_s);
+        put(kCommand, step.command);
+        put(kInterval, &step.interval_s);
+        put(kNis, &step.nis);
+        put(kNeesPosition, &step.nees_position);
+        put(kNees, &step.nees);
+        put(kSettled, &settled);
+        ++row;
+      };
+      const auto number = first_run + static_cast<std::uint32_t>(run);
+      const MissionResult result = single ? fly<float>(scenario, freedom, seed, number, sink)
+                                          : fly<double>(scenario, freedom, seed, number, sink);
+      const std::array<double, 6> values_of_run = {result.duration_s, result.settled_rms_m,
+                                                   result.all_rms_m,  result.position_rms_m,
+                                                   result.interval_s, result.rudder_travel_rad_s};
+      for (std::size_t i = 0; i < values_of_run.size(); ++i) of_run_out[i][run] = values_of_run[i];
+      fixes_out[run] = result.fixes;
+      refused_out[run] = result.refused;
+      status_out[run] = static_cast<std::uint8_t>(result.status);
+      finished_out[run] = result.finished;
+    }
+  }
+  py::dict result;
+  for (std::size_t c = 0; c < kColumns; ++c) result[names[c]] = columns[c];
+  for (std::size_t i = 0; i < numbers.size(); ++i) result[of_run[i]] = numbers[i];
+  result["fixes"] = fixes;
+  result["refused"] = refused;
+  result["status"] = status;
+  result["finished"] = finished;
+  return result;
+}
+
+}  // namespace
+
+void bind_mission(py::module_& m) {
+  m.def("fly_missions", &fly_missions, py::arg("scenario"));
+  m.def("mission_defaults", [] {
+    MissionScenario s;
+    py::dict result;
+    visit_numbers(s, [&result](const char* name, double& value) { result[name] = value; });
+    return result;
+  });
+}
+
+}  // namespace bindings
+}  // namespace auvest

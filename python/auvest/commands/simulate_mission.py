@@ -1,0 +1,264 @@
+"""``auvest simulate mission``: a torpedo steers itself along a track, by its own estimate.
+
+Compass, gyro, depth, log and USBL fixes, the filter, guidance, control, fins and propeller, and the
+hull in up to six degrees of freedom, ten times a second, in a current that nobody told it.
+
+Examples
+--------
+  auvest simulate mission
+
+  auvest simulate mission --track circle --filter ukf --guidance adaptive
+
+  auvest simulate mission --outliers 0.05 --kernel igg --current 0.5
+
+  auvest simulate mission --filter ukf --guidance adaptive --policy mahalanobis --json
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from rich.table import Table
+
+from auvest import CovarianceBudget, FixedInterval, MahalanobisInterval, RejectionStreak
+from auvest.commands import options
+from auvest.commands.console import Terminal, table
+from auvest.commands.files import write_csv
+from auvest.commands.options import FILTER, WORLD, finite, fraction, option, positive
+from auvest.commands.session import Session, failure, mean_over_runs
+from auvest.intervals import IntervalPolicy
+from auvest.kernels import KernelName
+from auvest.simulation import mission
+from auvest.simulation.mission import Estimate, Law, Mission, MissionResult, TrackKind
+
+_VEHICLE = "Vehicle"
+_MISSION = Mission()
+
+
+def command(
+    track: Annotated[TrackKind, option(WORLD, "lawnmower: four lanes; circle.")] = "lawnmower",
+    current: Annotated[
+        float, option(WORLD, "Speed of the current, m/s.", check=options.not_negative)
+    ] = _MISSION.current_m_s,
+    current_direction: Annotated[
+        float | None,
+        option(
+            WORLD,
+            "Where it flows to, degrees from north; default: drawn for each run.",
+            check=finite,
+        ),
+    ] = None,
+    outliers: Annotated[float, option(WORLD, "Share of late ranges.", check=fraction)] = 0.0,
+    latency: Annotated[
+        float, option(WORLD, "Delay of a fix, s.", check=options.not_negative)
+    ] = 0.0,
+    dropout: Annotated[float, option(WORLD, "Share of fixes that are lost.", check=fraction)] = 0.0,
+    compass_bias: Annotated[
+        float, option(WORLD, "Its standard deviation, degrees.", check=options.not_negative)
+    ] = math.degrees(_MISSION.compass_bias_rad),
+    degrees_of_freedom: Annotated[
+        int, option(_VEHICLE, "Of the hull: 6, 5, 4 or 3.", min=3, max=6)
+    ] = 6,
+    speed: Annotated[
+        float, option(_VEHICLE, "Through the water, m/s.", check=positive)
+    ] = _MISSION.speed_m_s,
+    arc: Annotated[
+        float,
+        option(
+            _VEHICLE,
+            "Radius of arcs instead of corners, m; 0: corners.",
+            check=options.not_negative,
+        ),
+    ] = 0.0,
+    guidance: Annotated[
+        Law, option(_VEHICLE, "Law; crab feeds the estimated current forward.")
+    ] = "crab",
+    kind: Annotated[
+        Estimate,
+        option(
+            FILTER,
+            "truth; fixes: the last one; ukf: constant acceleration; model-aided: dead reckoning "
+            "with the current in the state.",
+            "--filter",
+        ),
+    ] = "model-aided",
+    kernel: Annotated[KernelName, option(FILTER, "Robust kernel; unit: none.")] = "unit",
+    policy: Annotated[
+        Literal["fixed", "mahalanobis", "covariance-budget"],
+        option(FILTER, "When the next fix is asked for."),
+    ] = "fixed",
+    interval: Annotated[
+        float, option(FILTER, "Of fixes; with a policy the first, s.", check=positive)
+    ] = 0.5,
+    most: Annotated[
+        float, option(FILTER, "Largest interval of a policy, s.", "--max-interval", check=positive)
+    ] = 2.0,
+    budget: Annotated[
+        float,
+        option(FILTER, "sqrt(P_xx + P_yy) of covariance-budget, m.", check=positive),
+    ] = 1.0,
+    dtype: options.Precision = "float64",
+    runs: options.Runs = 50,
+    seed: options.Seed = 1,
+    workers: options.Workers = None,
+    output: options.Output = Path("auvest-output/simulate-mission"),
+    no_figure: options.NoFigure = False,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Simulate; the help text is the module's."""
+    terminal = Terminal(as_json=as_json, quiet=quiet)
+    with terminal.usage_errors():
+        paces: IntervalPolicy = FixedInterval(interval_s=interval)
+        least = min(0.1, interval)
+        if policy == "mahalanobis":
+            paces = MahalanobisInterval(initial_s=interval, min_s=least, max_s=most)
+        elif policy == "covariance-budget":
+            paces = CovarianceBudget(
+                position_sigma_m=budget, initial_s=interval, min_s=least, max_s=most
+            )
+        plan = Mission(
+            track=track,
+            estimate=kind,
+            guidance=guidance,
+            interval=paces,
+            kernel=None if kernel == "unit" else kernel,
+            recovery=None if kernel == "unit" else RejectionStreak(),
+            degrees_of_freedom=degrees_of_freedom,
+            dtype=dtype,
+            speed_m_s=speed,
+            current_m_s=current,
+            current_rad=math.nan if current_direction is None else math.radians(current_direction),
+            compass_bias_rad=math.radians(compass_bias),
+            usbl_outliers=outliers,
+            usbl_latency_s=latency,
+            usbl_dropout=dropout,
+            arc_m=arc,
+            runs=runs,
+            seed=seed,
+        )
+    session = Session(terminal, output, "simulate mission", mission.settings(plan))
+    result = session.run(mission.simulate, plan, workers=workers)
+    if result is None:
+        session.nothing_done()
+    values = measures(result)
+    with terminal.writing(output):
+        files = {"per_step": write_csv(output / "per_step.csv", means_per_step(result))}
+        if not no_figure:
+            files["figure"] = _draw(output / "figure.png", result)
+    session.report(values, files, _table(values, plan))
+    session.end("what was done is kept", failure(result))
+
+
+def measures(result: MissionResult) -> dict[str, Any]:
+    """Compute the numbers of the table: means over the runs, with standard errors."""
+    good = ~result.failed
+    numbers: dict[str, Any] = {
+        "runs": len(result.status),
+        "failed_runs": int(result.failed.sum()),
+        "fixes": int(result.fixes.sum()),
+        "refused_fixes": int(result.refused.sum()),
+    }
+    for name in ("settled_rms_m", "all_rms_m", "position_rms_m", "duration_s", "mean_interval_s"):
+        numbers[name], numbers[f"{name}_se"] = mean_and_error(getattr(result, name)[good])
+    travel = np.degrees(result.rudder_travel_rad_s[good])
+    numbers["rudder_travel_deg_s"], _ = mean_and_error(travel)
+    for name in ("nis", "nees_position", "nees"):
+        values = getattr(result, name)
+        known = np.isfinite(values)
+        numbers[f"{name}_mean"] = float(values[known].mean()) if known.any() else math.nan
+    return numbers
+
+
+def mean_and_error(values: mission.Floats) -> tuple[float, float]:
+    """Mean and its standard error; NaN where there are too few."""
+    if not len(values):
+        return math.nan, math.nan
+    error = float(values.std(ddof=1) / math.sqrt(len(values))) if len(values) > 1 else math.nan
+    return float(values.mean()), error
+
+
+def means_per_step(result: MissionResult) -> dict[str, mission.Floats]:
+    """Root mean squares over the runs, per step."""
+    error = np.square(result.estimate_m - result.pose[..., :2]).sum(axis=-1)
+    return {
+        "time_s": result.time_s,
+        "cross_rms_m": np.sqrt(mean_over_runs(np.square(result.cross_m))),
+        "position_rms_m": np.sqrt(mean_over_runs(error)),
+        "interval_s": mean_over_runs(result.interval_s),
+        "nees_position": mean_over_runs(result.nees_position),
+        "nees": mean_over_runs(result.nees),
+    }
+
+
+def _draw(path: Path, result: MissionResult) -> Path:
+    from auvest import plots  # here, because matplotlib takes long to import
+
+    plan = result.mission
+    title = f"{plan.estimate}, {plan.guidance}: one run of {len(result.status)}"
+    figure = plots.new_figure((10.0, 7.0), title)
+    grid = figure.add_gridspec(4, 2, width_ratios=(1.0, 1.25))
+    plane = figure.add_subplot(grid[:, 0])
+    pose, estimate = result.pose[0], result.estimate_m[0]
+    if plan.track == "circle":
+        x, y, radius = mission.CIRCLE
+        turn = np.linspace(0, 2 * np.pi, 200)
+        wanted = np.column_stack([x + radius * np.cos(turn), y + radius * np.sin(turn)])
+    else:
+        wanted = mission.LAWNMOWER
+    plane.plot(wanted[:, 1], wanted[:, 0], color=plots.GREY, linewidth=3, alpha=0.4, label="track")
+    plane.plot(pose[:, 1], pose[:, 0], color=plots.BLACK, linewidth=1.2, label="vehicle")
+    plane.plot(estimate[:, 1], estimate[:, 0], color=plots.BLUE, linewidth=0.7, label="estimate")
+    plane.plot(0, 0, "^", color=plots.GREEN, markersize=8, linestyle="none", label="USBL")
+    plane.set(xlabel="east / m", ylabel="north / m")
+    plane.set_aspect("equal", adjustable="datalim")
+    plane.legend(fontsize=8)
+    time = result.time_s
+    rows = (
+        ("cross-track / m", [(result.cross_m[0], plots.BLACK)]),
+        ("rudder / deg", [(np.degrees(result.command[0, :, 0]), plots.VERMILION)]),
+        ("interval / s", [(result.interval_s[0], plots.BLUE)]),
+    )
+    panels = [plane]
+    for row, (name, lines) in enumerate(rows):
+        panel = figure.add_subplot(grid[row, 1], sharex=panels[1] if row else None)
+        for values, colour in lines:
+            panel.plot(time, values, color=colour, linewidth=0.8)
+        panel.set_ylabel(name)
+        panel.tick_params(labelbottom=False)
+        panels.append(panel)
+    panel = figure.add_subplot(grid[3, 1], sharex=panels[1])
+    steps = means_per_step(result)
+    panel.plot(time, steps["nees_position"], color=plots.BLUE, linewidth=0.8)
+    panel.axhline(2.0, color=plots.BLACK, linewidth=0.6)
+    panel.set(ylabel="NEES, position,\nmean of runs", xlabel="time / s")
+    for axes in (*panels, panel):
+        plots.style(axes)
+    return plots.save(figure, path)
+
+
+def _table(values: dict[str, Any], plan: Mission) -> Table:
+    def with_error(name: str, unit: str) -> tuple[str, str]:
+        error = values[f"{name}_se"]
+        text = f"{values[name]:.3f}" + ("" if math.isnan(error) else f" ± {error:.3f}")
+        return text, unit
+
+    rows = [
+        ("cross-track RMS, settled", *with_error("settled_rms_m", "m")),
+        ("cross-track RMS, corners too", *with_error("all_rms_m", "m")),
+        ("position error of the estimate, RMS", *with_error("position_rms_m", "m")),
+        ("mean interval of fixes", *with_error("mean_interval_s", "s")),
+        ("rudder travel", f"{values['rudder_travel_deg_s']:.1f}", "deg/s"),
+        ("NIS, mean (2 expected)", f"{values['nis_mean']:.2f}", ""),
+        ("NEES of the position, mean (2 expected)", f"{values['nees_position_mean']:.2f}", ""),
+        ("NEES of four states, mean (4 expected)", f"{values['nees_mean']:.2f}", ""),
+    ]
+    title = (
+        f"{plan.track}, {plan.estimate}, {plan.guidance}: {values['runs']} runs, "
+        f"{plan.degrees_of_freedom} degrees of freedom, current {plan.current_m_s:g} m/s, "
+        f"seed {plan.seed}, {plan.dtype}"
+    )
+    return table(title, ("quantity", "value", "unit"), rows, right={1})

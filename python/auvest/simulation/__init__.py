@@ -1,0 +1,1 @@
+"""Vehicles in simulation: hull, sensors, and the loop that steers."""

@@ -1,0 +1,410 @@
+"""A torpedo flies a track: estimate, guidance, control, actuators, hull and sensors in one loop.
+
+The loop is C++ (``cpp/simulation/mission.hpp``), ten steps a second; the vehicle is ``remus100`` in
+6, 5, 4 or 3 degrees of freedom. Axes are north, east, down; angles count from north towards east.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, fields
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from auvest import _core, montecarlo
+from auvest._arguments import as_instance, as_integer, as_kind, as_number
+from auvest._core import Status
+from auvest.intervals import (
+    CovarianceBudget,
+    FixedInterval,
+    IntervalPolicy,
+    MahalanobisInterval,
+    core_interval,
+)
+from auvest.kernels import Kernel, KernelName, RejectionStreak, Unit, as_kernel, core_kernel
+
+_DEFAULTS = _core.mission_defaults()
+_FIXED = FixedInterval(interval_s=0.5)
+Floats: TypeAlias = npt.NDArray[np.float64]
+
+TrackKind: TypeAlias = Literal["lawnmower", "circle"]
+Estimate: TypeAlias = Literal["truth", "fixes", "ukf", "model-aided"]
+Law: TypeAlias = Literal["adaptive", "crab", "line-of-sight", "integral", "vector-field"]
+DType: TypeAlias = Literal["float64", "float32"]
+TRACKS: tuple[TrackKind, ...] = ("lawnmower", "circle")
+ESTIMATES: tuple[Estimate, ...] = ("truth", "fixes", "ukf", "model-aided")
+LAWS: tuple[Law, ...] = ("adaptive", "crab", "line-of-sight", "integral", "vector-field")
+
+#: Corners of the lawnmower, m; centre and radius of the circle, m.
+LAWNMOWER = np.array(
+    [[20, 20], [140, 20], [140, 60], [20, 60], [20, 100], [140, 100], [140, 140], [20, 140]], float
+)
+CIRCLE = (80.0, 80.0, 40.0)
+
+#: Steps of all runs together that are kept at most: 200 bytes each.
+MAX_STEPS = 5_000_000
+_ROWS = 8000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mission:
+    """What is flown, with what, and what the vehicle does not know.
+
+    Parameters
+    ----------
+    track : {"lawnmower", "circle"}
+        Four lanes of 120 m, 40 m apart; or a circle of radius 40 m for ``circle_s``.
+    estimate : {"truth", "fixes", "ukf", "model-aided"}
+        What guidance takes for the position: the truth (no sensor has noise), the last USBL fix, a
+        UKF of constant acceleration, or an EKF of dead reckoning with the current in its state
+        (:class:`auvest.SpeedHeadingCurrent`).
+    guidance : {"adaptive", "crab", "line-of-sight", "integral", "vector-field"}
+        Guidance law; "crab" feeds the estimated current forward and needs an estimate that has one.
+    interval : FixedInterval, MahalanobisInterval or CovarianceBudget
+        When the next fix is asked for, rounded to the period.
+    kernel : Kernel or its name, optional
+        Robust kernel of the filter.
+    recovery : RejectionStreak, optional
+        Recovery from lock-out; needs a kernel.
+    degrees_of_freedom : {6, 5, 4, 3}
+        Of the hull.
+    dtype : {"float64", "float32"}
+        Precision of the vehicle's own part; float32 gives the bits of the chip.
+    period_s, speed_m_s, depth_m
+        Period of the loop; speed through the water and depth that are held.
+    current_m_s, current_rad
+        Current, and where it flows to; NaN: drawn for each run.
+    initial_error_m
+        Standard deviation of the first estimate's error, per axis.
+    compass_bias_rad, compass_noise_rad, gyro_noise_rad_s, gyro_walk_rad_s, depth_noise_m
+        Standard deviations; the compass bias is drawn per run, the gyro's bias walks.
+    log_noise_m_s, log_scale
+        Of the water speeds, forward and sideways; relative error.
+    usbl_noise_m, usbl_noise_rad, usbl_outliers, usbl_outlier_m
+        Range and bearing from the station at (0, 0): noise; share of late ranges, and their mean.
+    usbl_latency_s, usbl_sound_m_s, usbl_dropout
+        Delay of a fix; speed of sound (0: none), by which a fix is late too; share that is lost.
+    acceleration_psd
+        Of the UKF, m^2/s^5.
+    model_position, model_current
+        Of the model-aided filter: power of the noise on the position, m^2/s, and the walk of the
+        current, m^2/s^3.
+    lookahead_m, switch_m, end_m, arc_m
+        Look-ahead distance; lead before a corner; end before the last waypoint; radius of arcs
+        instead of corners (0: corners).
+    circle_s, most_s
+        Length of the circle; longest lawnmower.
+    runs, seed : int
+        Monte Carlo runs; run r draws from its own streams of the seed.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If an argument lies outside its range.
+    """
+
+    track: TrackKind = "lawnmower"
+    estimate: Estimate = "model-aided"
+    guidance: Law = "crab"
+    interval: IntervalPolicy = _FIXED
+    kernel: Kernel | KernelName | None = None
+    recovery: RejectionStreak | None = None
+    degrees_of_freedom: int = 6
+    dtype: DType = "float64"
+    period_s: float = _DEFAULTS["period_s"]
+    speed_m_s: float = _DEFAULTS["speed_m_s"]
+    depth_m: float = _DEFAULTS["depth_m"]
+    current_m_s: float = _DEFAULTS["current_m_s"]
+    current_rad: float = _DEFAULTS["current_rad"]
+    initial_error_m: float = _DEFAULTS["initial_error_m"]
+    compass_bias_rad: float = _DEFAULTS["compass_bias_rad"]
+    compass_noise_rad: float = _DEFAULTS["compass_noise_rad"]
+    gyro_noise_rad_s: float = _DEFAULTS["gyro_noise_rad_s"]
+    gyro_walk_rad_s: float = _DEFAULTS["gyro_walk_rad_s"]
+    depth_noise_m: float = _DEFAULTS["depth_noise_m"]
+    log_noise_m_s: float = _DEFAULTS["log_noise_m_s"]
+    log_scale: float = _DEFAULTS["log_scale"]
+    usbl_noise_m: float = _DEFAULTS["usbl_noise_m"]
+    usbl_noise_rad: float = _DEFAULTS["usbl_noise_rad"]
+    usbl_outliers: float = _DEFAULTS["usbl_outliers"]
+    usbl_outlier_m: float = _DEFAULTS["usbl_outlier_m"]
+    usbl_sound_m_s: float = _DEFAULTS["usbl_sound_m_s"]
+    usbl_latency_s: float = _DEFAULTS["usbl_latency_s"]
+    usbl_dropout: float = _DEFAULTS["usbl_dropout"]
+    acceleration_psd: float = _DEFAULTS["acceleration_psd"]
+    model_position: float = _DEFAULTS["model_position"]
+    model_current: float = _DEFAULTS["model_current"]
+    lookahead_m: float = _DEFAULTS["lookahead_m"]
+    switch_m: float = _DEFAULTS["switch_m"]
+    end_m: float = _DEFAULTS["end_m"]
+    arc_m: float = _DEFAULTS["arc_m"]
+    circle_s: float = _DEFAULTS["circle_s"]
+    most_s: float = _DEFAULTS["most_s"]
+    runs: int = 50
+    seed: int = 1
+
+    def __post_init__(self) -> None:
+        set_field = object.__setattr__
+        as_kind("track", self.track, TRACKS)
+        as_kind("estimate", self.estimate, ESTIMATES)
+        as_kind("guidance", self.guidance, LAWS)
+        as_kind("dtype", self.dtype, ("float64", "float32"))
+        as_instance("interval", self.interval, IntervalPolicy.__args__)
+        if self.guidance == "crab" and self.estimate in ("fixes", "ukf"):
+            raise ValueError(
+                f"guidance 'crab' needs an estimate of the current: 'truth' or 'model-aided', not "
+                f"{self.estimate!r}"
+            )
+        if self.kernel is not None:
+            set_field(self, "kernel", as_kernel(self.kernel))
+        if self.recovery is not None:
+            as_instance("recovery", self.recovery, RejectionStreak)
+            if self.kernel is None:
+                raise ValueError("recovery is for filters with a kernel")
+        for name in _DEFAULTS:
+            bound = "positive" if name in _POSITIVE else "not negative"
+            if name == "log_scale":
+                bound = "any"
+            value = getattr(self, name)
+            if name == "current_rad":
+                value = float("nan") if value != value else as_number(name, value)
+                set_field(self, name, value)
+                continue
+            number = as_number(name, value, bound)  # type: ignore[arg-type]
+            if name in ("usbl_outliers", "usbl_dropout") and number > 1:
+                raise ValueError(f"{name} is a probability and must lie in 0..1, not {number}")
+            set_field(self, name, number)
+        limits = {"runs": (1, 100_000), "seed": (0, 2**64 - 1), "degrees_of_freedom": (3, 6)}
+        for name, (low, high) in limits.items():
+            set_field(self, name, as_integer(name, getattr(self, name), low, high))
+
+
+_POSITIVE = (
+    "period_s",
+    "speed_m_s",
+    "usbl_noise_m",
+    "usbl_noise_rad",
+    "acceleration_psd",
+    "lookahead_m",
+    "switch_m",
+    "circle_s",
+    "most_s",
+)
+
+
+@dataclass(frozen=True)
+class MissionResult:
+    """What :func:`simulate` returns; a row per run, NaN behind the end of a run.
+
+    Attributes
+    ----------
+    settled_rms_m, all_rms_m : ndarray, shape (runs,)
+        Cross-track error beside the active leg: from 50 m into a leg (60 s into the circle), and
+        corners too.
+    position_rms_m, duration_s, mean_interval_s, rudder_travel_rad_s : ndarray, shape (runs,)
+        Error of the estimate; length of the run; mean time between fixes; mean rate of the rudder.
+    fixes, refused : ndarray, shape (runs,)
+        Fixes taken, and those that the filter refused.
+    status, finished : ndarray, shape (runs,)
+        The core's status of each run; whether the track was flown to its end.
+    pose, water : ndarray, shape (runs, T, 6)
+        North, east, down (m), roll, pitch, yaw (rad); velocities through the water, body axes.
+    cross_m, interval_s, nis, nees_position, nees, settled : ndarray, shape (runs, T)
+        Of each step; NEES of the position, and of all states that the truth has.
+    estimate_m, estimate_current_m_s : ndarray, shape (runs, T, 2)
+    command : ndarray, shape (runs, T, 3)
+        Rudder, stern planes (rad), propeller (rev/s).
+    mission : Mission
+        What was simulated.
+    """
+
+    settled_rms_m: Floats
+    all_rms_m: Floats
+    position_rms_m: Floats
+    duration_s: Floats
+    mean_interval_s: Floats
+    rudder_travel_rad_s: Floats
+    fixes: npt.NDArray[np.int64]
+    refused: npt.NDArray[np.int64]
+    status: npt.NDArray[np.uint8]
+    finished: npt.NDArray[np.bool_]
+    pose: Floats
+    water: Floats
+    cross_m: Floats
+    interval_s: Floats
+    nis: Floats
+    nees_position: Floats
+    nees: Floats
+    settled: Floats
+    estimate_m: Floats
+    estimate_current_m_s: Floats
+    command: Floats
+    mission: Mission
+
+    @property
+    def failed(self) -> npt.NDArray[np.bool_]:
+        """Runs that ended with a status or did not reach the end of the track."""
+        failed: npt.NDArray[np.bool_] = (self.status != int(Status.ok)) | ~self.finished
+        return failed
+
+    @property
+    def time_s(self) -> Floats:
+        """Time of the kept steps, s, shape (T,)."""
+        return np.asarray(np.arange(self.cross_m.shape[1]) * self.mission.period_s)
+
+
+def simulate(
+    mission: Mission,
+    *,
+    record: bool = True,
+    workers: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> MissionResult:
+    """Fly all runs of a mission, on all cores.
+
+    Parameters
+    ----------
+    mission : Mission
+        What is flown.
+    record : bool
+        Whether every step is kept, not the numbers of each run alone.
+    workers : int, optional
+        Threads; default: one per processor. The result does not depend on it.
+    progress : callable, optional
+        Called as ``progress(runs_done, runs)``.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If an argument is wrong.
+    montecarlo.Interrupted
+        After Ctrl-C; ``partial`` has the runs that are done.
+    """
+    as_instance("mission", mission, Mission)
+    kernel = Unit() if mission.kernel is None else as_kernel(mission.kernel)
+    longest = mission.circle_s if mission.track == "circle" else mission.most_s
+    rows = min(int(longest / mission.period_s) + 2, _ROWS) if record else 0
+    if mission.runs * rows > MAX_STEPS:
+        raise ValueError(
+            f"{mission.runs} runs of {rows} steps are more than {MAX_STEPS:,}: record=False keeps "
+            "the numbers of each run alone"
+        )
+    values = {name: getattr(mission, name) for name in _DEFAULTS}
+    values.update(
+        track=mission.track,
+        estimate=mission.estimate,
+        guidance=mission.guidance,
+        interval=core_interval(mission.interval, "float64"),
+        kernel=core_kernel(kernel, "float64"),
+        rejections=0 if mission.recovery is None else mission.recovery.rejections,
+        freedom=mission.degrees_of_freedom,
+        dtype=mission.dtype,
+        seed=mission.seed,
+        rows=rows,
+    )
+
+    def part(first: int, count: int) -> dict[str, npt.NDArray[Any]]:
+        return _core.fly_missions({**values, "first_run": first, "runs": count})
+
+    def finished(columns: dict[str, npt.NDArray[Any]]) -> MissionResult:
+        kept = {name: column for name, column in columns.items() if column.ndim == 1}
+        known = np.isfinite(columns["cross_m"]).any(axis=0)
+        last = int(np.flatnonzero(known)[-1]) + 1 if known.any() else 0
+        kept.update({n: column[:, :last] for n, column in columns.items() if column.ndim > 1})
+        return MissionResult(**kept, mission=mission)
+
+    try:
+        columns = montecarlo.run(
+            part,
+            runs=mission.runs,
+            chunk=montecarlo.chunk_for(mission.runs, max(rows, 1000), workers),
+            workers=workers,
+            progress=progress,
+        )
+    except montecarlo.Interrupted as stop:
+        if stop.partial is not None:
+            stop.partial = finished(stop.partial)
+        raise
+    return finished(columns)
+
+
+def settings(mission: Mission) -> dict[str, Any]:
+    """Give a mission as plain values, for files and JSON."""
+    values = {field.name: getattr(mission, field.name) for field in fields(mission)}
+    for name in ("interval", "kernel", "recovery"):
+        value = values[name]
+        if value is not None:
+            values[name] = {"class": type(value).__name__, **asdict(value)}
+    return values
+
+
+# ---- The rows of the closed-loop table -----------------------------------------------------------
+
+#: What guidance runs on, by the name of the row.
+SOURCES = (
+    "truth",
+    "truth_crab",
+    "fixes",
+    "ukf",
+    "ukf_default_psd",
+    "ukf_outliers",
+    "aukf_law",
+    "aukf_budget",
+    "model_aided",
+    "model_aided_crab",
+    "model_aided_outliers",
+    "robust_model_aided",
+    "robust_model_aided_outliers",
+)
+_DEFAULT_PSD = 1e-5
+
+
+def source(name: str, track: TrackKind, *, interval_s: float = 0.5, **options: Any) -> Mission:
+    """Give the mission of a row of the closed-loop table.
+
+    Parameters
+    ----------
+    name : str
+        One of :data:`SOURCES`.
+    track : {"lawnmower", "circle"}
+        Where it is flown.
+    interval_s : float
+        Time between fixes, where it is fixed.
+    **options
+        Anything else of :class:`Mission`.
+
+    Raises
+    ------
+    ValueError
+        If there is no such row.
+    """
+    as_kind("name", name, SOURCES)
+    as_kind("track", track, TRACKS)
+    estimates: dict[str, Estimate] = {"truth": "truth", "fixes": "fixes", "ukf": "ukf"}
+    head = name.removeprefix("robust_").partition("_")[0]
+    values: dict[str, Any] = {
+        "track": track,
+        "estimate": "ukf" if head == "aukf" else estimates.get(head, "model-aided"),
+        "interval": FixedInterval(interval_s=interval_s),
+    }
+    crab = name in ("truth_crab", "model_aided_crab", "model_aided_outliers") or (
+        name.startswith("robust_")
+    )
+    values["guidance"] = "crab" if crab else "adaptive"
+    if name.endswith("_outliers"):
+        values["usbl_outliers"] = 0.05
+    if name == "ukf_default_psd":
+        values["acceleration_psd"] = _DEFAULT_PSD
+    if name == "aukf_law":
+        most = 1.18 if track == "lawnmower" else 1.105
+        values["interval"] = MahalanobisInterval(initial_s=0.5, min_s=0.1, max_s=most)
+    if name == "aukf_budget":
+        budget = 1.155 if track == "lawnmower" else 1.09
+        values["interval"] = CovarianceBudget(
+            position_sigma_m=budget, initial_s=0.5, min_s=0.1, max_s=2.0
+        )
+    if name.startswith("robust_"):
+        values.update(kernel="igg", recovery=RejectionStreak())
+    return Mission(**{**values, **options})
