@@ -19,6 +19,7 @@
 #include "auvest/status.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// What the controllers read of the vehicle.
 template <class Scalar>
@@ -132,4 +133,5 @@ class Autopilot {
   PitchControl<Scalar> pitch_;
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -10,6 +10,7 @@
 #include "auvest/status.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 class DepthControl : public IntegratingControl<Scalar_> {
@@ -70,4 +71,5 @@ class DepthControl : public IntegratingControl<Scalar_> {
   Params params_;
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

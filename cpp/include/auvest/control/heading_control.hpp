@@ -23,6 +23,7 @@
 #include "auvest/status.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 class HeadingControl : public IntegratingControl<Scalar_> {
@@ -99,4 +100,5 @@ class HeadingControl : public IntegratingControl<Scalar_> {
   Scalar rate_gain_, error_gain_, integral_gain_;
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -17,6 +17,7 @@
 #include "auvest/status.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 class HeadingFilter {
@@ -84,4 +85,5 @@ class HeadingFilter {
   bool initialised_;
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -14,6 +14,7 @@
 #include "auvest/status.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 class HeadingReference {
@@ -92,4 +93,5 @@ class HeadingReference {
   Scalar heading_;
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -19,6 +19,7 @@
 #include "auvest/status.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 class HeadingSlidingMode : public IntegratingControl<Scalar_> {
@@ -96,4 +97,5 @@ class HeadingSlidingMode : public IntegratingControl<Scalar_> {
   Params params_;
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

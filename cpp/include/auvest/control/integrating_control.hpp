@@ -13,6 +13,7 @@
 #include "auvest/status.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// One step of a controller.
 template <class Scalar>
@@ -72,4 +73,5 @@ class IntegratingControl {
   Scalar integral_;
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -11,6 +11,7 @@
 #include "auvest/status.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 class PitchControl : public IntegratingControl<Scalar_> {
@@ -77,4 +78,5 @@ class PitchControl : public IntegratingControl<Scalar_> {
   Params params_;
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -18,6 +18,7 @@
 #include "auvest/types.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 class PoseControl {
@@ -130,4 +131,5 @@ class PoseControl {
   Vector6 integral_;
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -4,6 +4,7 @@
 #include "auvest/config.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// In the unit of the value: rad for a heading or pitch, m for a depth.
 template <class Scalar>
@@ -13,4 +14,5 @@ struct Reference {
   Scalar acceleration = Scalar(0);  ///< per s^2
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -15,6 +15,7 @@
 #include "auvest/status.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// `Angle`: the value is an angle and is kept in (-pi, pi].
 template <class Scalar_, bool Angle = true>
@@ -91,4 +92,5 @@ class ReferenceModel {
   Reference<Scalar> state_;
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

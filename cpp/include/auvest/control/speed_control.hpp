@@ -10,6 +10,7 @@
 #include "auvest/status.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 class SpeedControl : public IntegratingControl<Scalar_> {
@@ -73,4 +74,5 @@ class SpeedControl : public IntegratingControl<Scalar_> {
   Params params_;
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

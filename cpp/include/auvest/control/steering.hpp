@@ -5,6 +5,7 @@
 #include "auvest/math/basic.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar>
 struct Steering {
@@ -38,4 +39,5 @@ struct Steering {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

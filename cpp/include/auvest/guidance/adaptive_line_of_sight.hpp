@@ -13,6 +13,7 @@
 #include "auvest/math/trigonometry.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 class AdaptiveLineOfSight : public GuidanceLaw<AdaptiveLineOfSight<Scalar_>, Scalar_> {
@@ -73,4 +74,5 @@ class AdaptiveLineOfSight : public GuidanceLaw<AdaptiveLineOfSight<Scalar_>, Sca
   Scalar crab_;
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

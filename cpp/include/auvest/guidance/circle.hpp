@@ -15,6 +15,7 @@
 #include "auvest/status.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 class Circle {
@@ -103,4 +104,5 @@ class Circle {
   Scalar length_;
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

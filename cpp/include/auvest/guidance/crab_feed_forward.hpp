@@ -10,6 +10,7 @@
 #include "auvest/math/trigonometry.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 class CrabFeedForward : public GuidanceLaw<CrabFeedForward<Scalar_>, Scalar_> {
@@ -69,4 +70,5 @@ class CrabFeedForward : public GuidanceLaw<CrabFeedForward<Scalar_>, Scalar_> {
   Scalar current_x_, current_y_;
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

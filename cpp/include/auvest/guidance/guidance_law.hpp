@@ -23,6 +23,7 @@
 #include "auvest/status.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// What to steer.
 template <class Scalar>
@@ -71,4 +72,5 @@ class GuidanceLaw {
   Status check_;
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -11,6 +11,7 @@
 #include "auvest/math/trigonometry.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 class IntegralLineOfSight : public GuidanceLaw<IntegralLineOfSight<Scalar_>, Scalar_> {
@@ -67,4 +68,5 @@ class IntegralLineOfSight : public GuidanceLaw<IntegralLineOfSight<Scalar_>, Sca
   Scalar integral_;
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -13,6 +13,7 @@
 #include "auvest/status.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 class Line {
@@ -73,4 +74,5 @@ class Line {
   Scalar length_;
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -10,6 +10,7 @@
 #include "auvest/math/trigonometry.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 class LineOfSight : public GuidanceLaw<LineOfSight<Scalar_>, Scalar_> {
@@ -41,4 +42,5 @@ class LineOfSight : public GuidanceLaw<LineOfSight<Scalar_>, Scalar_> {
   Params params_;
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -6,6 +6,7 @@
 #include "auvest/config.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// The point of a path beside a vehicle.
 template <class Scalar>
@@ -20,4 +21,5 @@ struct PathPoint {
       Scalar(0);  ///< kappa [1/m]: positive where the path turns clockwise, 0 on a line
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

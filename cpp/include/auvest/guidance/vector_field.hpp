@@ -11,6 +11,7 @@
 #include "auvest/math/trigonometry.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 class VectorField : public GuidanceLaw<VectorField<Scalar_>, Scalar_> {
@@ -48,4 +49,5 @@ class VectorField : public GuidanceLaw<VectorField<Scalar_>, Scalar_> {
   Params params_;
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -14,6 +14,7 @@
 #include "auvest/status.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 class VerticalLineOfSight {
@@ -82,4 +83,5 @@ class VerticalLineOfSight {
   Scalar attack_;
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -26,6 +26,7 @@
 #include "auvest/status.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// North and east [m]: 8 bytes each in float.
 template <class Scalar>
@@ -289,4 +290,5 @@ class Waypoints {
   Scalar remaining_ = Scalar(0);
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -20,6 +20,7 @@
 #include "auvest/models/white_acceleration.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 struct SpeedHeadingCurrent : ProcessModel<SpeedHeadingCurrent<Scalar_>, Scalar_, 4> {
@@ -120,4 +121,5 @@ struct SpeedHeadingCurrent : ProcessModel<SpeedHeadingCurrent<Scalar_>, Scalar_,
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

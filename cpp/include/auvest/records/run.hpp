@@ -17,6 +17,7 @@
 #include "auvest/types.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar, class Time>
 struct TimedEcho {
@@ -91,4 +92,5 @@ Status run_record(Filter& filter, Next&& next, const Sonar<typename Row::Scalar>
   return status;
 }
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -18,6 +18,7 @@
 #include "auvest/vehicle/freedom.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 struct AddedMass {
@@ -137,4 +138,5 @@ AUVEST_OUTLINE void subtract_coriolis(const Matrix<Scalar, 6, 6>& M, const Value
   }
 }
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

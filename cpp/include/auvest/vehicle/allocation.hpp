@@ -20,6 +20,7 @@
 #include "auvest/vehicle/lag.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 namespace detail {
 
 /// An axis that depends on those before it is given up: its demand counts for nothing.
@@ -207,4 +208,5 @@ bool redistribute(const Matrix<Scalar, 6, Count>& T, const Vector<Scalar, 6>& de
   return false;
 }
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

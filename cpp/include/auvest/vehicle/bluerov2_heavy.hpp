@@ -8,6 +8,7 @@
 #include "auvest/vehicle/rov.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 namespace detail {
 
 template <class Mount, class Scalar>
@@ -119,4 +120,5 @@ typename Rov<Scalar, 8>::Params bluerov2_heavy_wu2018() {
   return p;
 }
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -11,6 +11,7 @@
 #include "auvest/vehicle/torpedo.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// Command and state as those of Torpedo: rudder, stern planes [rad], shaft [rev/s].
 template <class Scalar_>
@@ -137,4 +138,5 @@ struct CoefficientTorpedo {
   };
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -15,6 +15,7 @@
 #include "auvest/vehicle/flow.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// I0 [m^3/s^2] and I1 [m^4/s^2] of a hull of `length` [m] in the flow v + x r.
 template <class Scalar, class Value>
@@ -86,4 +87,5 @@ struct CrossFlow {
   Scalar scale_;  // 1/2 rho d C [kg/m^2]
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

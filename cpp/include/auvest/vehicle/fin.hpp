@@ -11,6 +11,7 @@
 #include "auvest/vehicle/lag.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// `Force` is the axis of the fins' force: kSway of a rudder, kHeave of stern planes.
 template <class Scalar_, int Force>
@@ -64,4 +65,5 @@ struct Fin {
   Scalar scale_;  // 1/2 rho A_f times the slope
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -5,6 +5,7 @@
 #include "auvest/vehicle/freedom.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Value>
 struct Flow {
@@ -26,4 +27,5 @@ struct Flow {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -11,6 +11,7 @@
 #include "auvest/vehicle/freedom.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// Sine and cosine of roll, pitch and yaw; 0 and 1 of those that a projection drops.
 template <class Value>
@@ -84,4 +85,5 @@ AUVEST_OUTLINE void pose_rates(const Attitude<Value>& a, const Value* nu, const 
   for (int i = 0; i < Freedom::kSize; ++i) rate[i] = all[Freedom::axis(i)];
 }
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

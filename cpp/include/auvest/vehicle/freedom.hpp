@@ -17,6 +17,7 @@
 #include "auvest/config.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// Body axes: x forward, y to starboard, z down, and the rotations about them.
 enum Axis : std::uint8_t { kSurge, kSway, kHeave, kRoll, kPitch, kYaw };
@@ -45,4 +46,5 @@ struct ThreeDof {
   static constexpr bool keeps(int axis) { return axis < kHeave || axis == kYaw; }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

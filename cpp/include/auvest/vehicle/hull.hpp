@@ -36,6 +36,7 @@
 #include "auvest/vehicle/rigid_body.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// What every vehicle has. A group of parameters is visited by its name and has a visit of its own.
 template <class Scalar>
@@ -249,4 +250,5 @@ class Hull {
   Matrix<Scalar, kVelocities, kVelocities> inverse_;
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

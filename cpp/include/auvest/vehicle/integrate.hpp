@@ -16,6 +16,7 @@
 #include "auvest/vehicle/freedom.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 struct Rk4 {
   template <class Hull, class Value>
@@ -82,4 +83,5 @@ Status advance(const Hull& hull, typename Hull::State& x, const typename Hull::C
   return Status::kOk;
 }
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

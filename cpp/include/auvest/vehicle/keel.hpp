@@ -9,6 +9,7 @@
 #include "auvest/vehicle/lift_drag.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 struct Keel {
@@ -80,4 +81,5 @@ struct NoKeel {
   Status check() const { return Status::kOk; }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -7,6 +7,7 @@
 #include "auvest/status.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// `value` moved into [low, high]; a NaN stays one.
 template <class Value>
@@ -81,4 +82,5 @@ struct Lag {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

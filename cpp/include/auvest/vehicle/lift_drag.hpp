@@ -15,6 +15,7 @@
 #include "auvest/vehicle/flow.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 struct LiftDrag {
@@ -93,4 +94,5 @@ Scalar low_aspect_lift_slope(Scalar aspect_ratio) {
   return math::pi<Scalar>() * aspect_ratio / (Scalar(1) + math::sqrt(Scalar(1) + half * half));
 }
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

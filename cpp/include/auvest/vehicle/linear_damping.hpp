@@ -10,6 +10,7 @@
 #include "auvest/vehicle/flow.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// `Fading` false: k is 0, and needs neither speed nor exponential.
 template <class Scalar_, bool Fading>
@@ -69,4 +70,5 @@ struct LinearDamping {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -14,6 +14,7 @@
 #include "auvest/vehicle/lag.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 struct Propeller {
@@ -111,4 +112,5 @@ struct Propeller {
   Scalar thrust_n_, thrust_va_, torque_n_, torque_va_;  // of n|n| and of |n| V_a
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -6,6 +6,7 @@
 #include "auvest/vehicle/flow.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 struct QuadraticDamping {
@@ -56,4 +57,5 @@ struct QuadraticDamping {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -6,6 +6,7 @@
 #include "auvest/vehicle/torpedo.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// `Keel_`: Keel<Scalar> for a set with a keel, of area 0 until you give it one.
 template <class Scalar, class Keel_ = NoKeel<Scalar>>
@@ -73,4 +74,5 @@ typename Torpedo<Scalar, Keel_>::Params remus100() {
   return p;
 }
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -11,6 +11,7 @@
 #include "auvest/vehicle/coefficient_torpedo.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar>
 typename CoefficientTorpedo<Scalar>::Params remus100_prestero() {
@@ -75,4 +76,5 @@ typename CoefficientTorpedo<Scalar>::Params remus100_prestero() {
   return p;
 }
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -8,6 +8,7 @@
 #include "auvest/vehicle/rigid_body.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 struct Restoring {
@@ -76,4 +77,5 @@ struct Restoring {
   Scalar arm_[3];  // r_g W - r_b B [N m]
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

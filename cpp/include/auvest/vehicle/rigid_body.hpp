@@ -6,6 +6,7 @@
 #include "auvest/types.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
 struct RigidBody {
@@ -72,4 +73,5 @@ struct RigidBody {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

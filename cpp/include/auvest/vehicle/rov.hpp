@@ -10,6 +10,7 @@
 #include "auvest/vehicle/thrusters.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// The command is the normalised input of each thruster; the state, its thrust [N].
 template <class Scalar_, int Count, class Curve = OddThrust<Scalar_>>
@@ -77,4 +78,5 @@ struct Rov {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

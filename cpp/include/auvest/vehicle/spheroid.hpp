@@ -8,6 +8,7 @@
 #include "auvest/vehicle/rigid_body.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar>
 struct Spheroid {
@@ -51,4 +52,5 @@ struct Spheroid {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

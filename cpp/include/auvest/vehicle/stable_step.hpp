@@ -24,6 +24,7 @@
 #include "auvest/vehicle/integrate.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 namespace detail {
 
 /// The hull linearised about a state.
@@ -243,4 +244,5 @@ Status check_step(const Hull& hull, const typename Hull::State& x,
   return stable ? Status::kOk : Status::kUnstableStep;
 }
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

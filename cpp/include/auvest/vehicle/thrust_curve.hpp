@@ -13,6 +13,7 @@
 #include "auvest/vehicle/lag.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// An odd polynomial of degree 9, the same ahead and astern, monotone up to the input's limit.
 template <class Scalar_>
@@ -160,4 +161,5 @@ struct QuadraticThrust {
   Scalar span_;  // 1 - dead band
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -9,6 +9,7 @@
 #include "auvest/vehicle/lag.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_, int Count, class Curve_>
 struct Thrusters {
@@ -118,4 +119,5 @@ struct Thrusters {
   Matrix6 matrix_;
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -14,6 +14,7 @@
 #include "auvest/vehicle/propeller.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 /// The actuators of a torpedo, in the order of command and state.
 enum TorpedoActuator : std::uint8_t {
@@ -119,4 +120,5 @@ struct Torpedo {
   }
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest
