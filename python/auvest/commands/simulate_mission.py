@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from rich.table import Table
@@ -26,13 +26,15 @@ from rich.table import Table
 from auvest import CovarianceBudget, FixedInterval, MahalanobisInterval, RejectionStreak
 from auvest.commands import options
 from auvest.commands.console import Terminal, table
-from auvest.commands.files import write_csv
 from auvest.commands.options import FILTER, WORLD, finite, fraction, option, positive
 from auvest.commands.session import Session, failure, mean_over_runs
 from auvest.intervals import IntervalPolicy
 from auvest.kernels import KernelName
 from auvest.simulation import mission
 from auvest.simulation.mission import Estimate, Law, Mission, MissionResult, TrackKind
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _VEHICLE = "Vehicle"
 _MISSION = Mission()
@@ -142,14 +144,11 @@ def command(
         )
     session = Session(terminal, output, "simulate mission", mission.settings(plan))
     result = session.run(mission.simulate, plan, workers=workers)
-    if result is None:
-        session.nothing_done()
     values = measures(result)
-    with terminal.writing(output):
-        files = {"per_step": write_csv(output / "per_step.csv", means_per_step(result))}
-        if not no_figure:
-            files["figure"] = _draw(output / "figure.png", result)
-    session.report(values, files, _table(values, plan))
+    session.write_csv("per_step", means_per_step(result))
+    if not no_figure:
+        session.draw(_figure, result)
+    session.report(values, _table(values, plan))
     session.end("what was done is kept", failure(result))
 
 
@@ -194,7 +193,7 @@ def means_per_step(result: MissionResult) -> dict[str, mission.Floats]:
     }
 
 
-def _draw(path: Path, result: MissionResult) -> Path:
+def _figure(result: MissionResult) -> Figure:
     from auvest import plots  # here, because matplotlib takes long to import
 
     plan = result.mission
@@ -237,7 +236,7 @@ def _draw(path: Path, result: MissionResult) -> Path:
     panel.set(ylabel="NEES, position,\nmean of runs", xlabel="time / s")
     for axes in (*panels, panel):
         plots.style(axes)
-    return plots.save(figure, path)
+    return figure
 
 
 def _table(values: dict[str, Any], plan: Mission) -> Table:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from auvest import _core
+from auvest._fields import not_negative
 from auvest.models._base import ProcessModel
 
 _DEFAULTS = _core.process_defaults("SpeedHeadingCurrent")
@@ -34,8 +35,5 @@ class SpeedHeadingCurrent(ProcessModel):
     state = ("x_m", "y_m", "current_x_m_s", "current_y_m_s")
     input = ("forward_m_s", "starboard_m_s", "heading_rad")
 
-    position_psd: float = _DEFAULTS["position_psd"]
-    current_psd: float = _DEFAULTS["current_psd"]
-
-    def __post_init__(self) -> None:
-        self._set_numbers("not negative", "position_psd", "current_psd")
+    position_psd: float = not_negative(_DEFAULTS["position_psd"])
+    current_psd: float = not_negative(_DEFAULTS["current_psd"])

@@ -14,8 +14,17 @@ import numpy as np
 import numpy.typing as npt
 
 from auvest import _core, montecarlo
-from auvest._arguments import as_instance, as_integer, as_kind, as_number
+from auvest._arguments import as_instance, as_kind, as_number
 from auvest._core import Status
+from auvest._fields import (
+    Checked,
+    choice,
+    fraction,
+    integer,
+    not_negative,
+    number,
+    positive,
+)
 from auvest.intervals import (
     CovarianceBudget,
     FixedInterval,
@@ -49,7 +58,7 @@ _ROWS = 8000
 
 
 @dataclass(frozen=True, kw_only=True)
-class Mission:
+class Mission(Checked):
     """What is flown, with what, and what the vehicle does not know.
 
     Parameters
@@ -105,52 +114,48 @@ class Mission:
         If an argument lies outside its range.
     """
 
-    track: TrackKind = "lawnmower"
-    estimate: Estimate = "model-aided"
-    guidance: Law = "crab"
+    track: TrackKind = choice("lawnmower", "circle")
+    estimate: Estimate = choice("model-aided", "truth", "fixes", "ukf")
+    guidance: Law = choice("crab", "adaptive", "line-of-sight", "integral", "vector-field")
     interval: IntervalPolicy = _FIXED
     kernel: Kernel | KernelName | None = None
     recovery: RejectionStreak | None = None
-    degrees_of_freedom: int = 6
-    dtype: DType = "float64"
-    period_s: float = _DEFAULTS["period_s"]
-    speed_m_s: float = _DEFAULTS["speed_m_s"]
-    depth_m: float = _DEFAULTS["depth_m"]
-    current_m_s: float = _DEFAULTS["current_m_s"]
+    degrees_of_freedom: int = integer(6, 3, 6)
+    dtype: DType = choice("float64", "float32")
+    period_s: float = positive(_DEFAULTS["period_s"])
+    speed_m_s: float = positive(_DEFAULTS["speed_m_s"])
+    depth_m: float = not_negative(_DEFAULTS["depth_m"])
+    current_m_s: float = not_negative(_DEFAULTS["current_m_s"])
     current_rad: float = _DEFAULTS["current_rad"]
-    initial_error_m: float = _DEFAULTS["initial_error_m"]
-    compass_bias_rad: float = _DEFAULTS["compass_bias_rad"]
-    compass_noise_rad: float = _DEFAULTS["compass_noise_rad"]
-    gyro_noise_rad_s: float = _DEFAULTS["gyro_noise_rad_s"]
-    gyro_walk_rad_s: float = _DEFAULTS["gyro_walk_rad_s"]
-    depth_noise_m: float = _DEFAULTS["depth_noise_m"]
-    log_noise_m_s: float = _DEFAULTS["log_noise_m_s"]
-    log_scale: float = _DEFAULTS["log_scale"]
-    usbl_noise_m: float = _DEFAULTS["usbl_noise_m"]
-    usbl_noise_rad: float = _DEFAULTS["usbl_noise_rad"]
-    usbl_outliers: float = _DEFAULTS["usbl_outliers"]
-    usbl_outlier_m: float = _DEFAULTS["usbl_outlier_m"]
-    usbl_sound_m_s: float = _DEFAULTS["usbl_sound_m_s"]
-    usbl_latency_s: float = _DEFAULTS["usbl_latency_s"]
-    usbl_dropout: float = _DEFAULTS["usbl_dropout"]
-    acceleration_psd: float = _DEFAULTS["acceleration_psd"]
-    model_position: float = _DEFAULTS["model_position"]
-    model_current: float = _DEFAULTS["model_current"]
-    lookahead_m: float = _DEFAULTS["lookahead_m"]
-    switch_m: float = _DEFAULTS["switch_m"]
-    end_m: float = _DEFAULTS["end_m"]
-    arc_m: float = _DEFAULTS["arc_m"]
-    circle_s: float = _DEFAULTS["circle_s"]
-    most_s: float = _DEFAULTS["most_s"]
-    runs: int = 50
-    seed: int = 1
+    initial_error_m: float = not_negative(_DEFAULTS["initial_error_m"])
+    compass_bias_rad: float = not_negative(_DEFAULTS["compass_bias_rad"])
+    compass_noise_rad: float = not_negative(_DEFAULTS["compass_noise_rad"])
+    gyro_noise_rad_s: float = not_negative(_DEFAULTS["gyro_noise_rad_s"])
+    gyro_walk_rad_s: float = not_negative(_DEFAULTS["gyro_walk_rad_s"])
+    depth_noise_m: float = not_negative(_DEFAULTS["depth_noise_m"])
+    log_noise_m_s: float = not_negative(_DEFAULTS["log_noise_m_s"])
+    log_scale: float = number(_DEFAULTS["log_scale"])
+    usbl_noise_m: float = positive(_DEFAULTS["usbl_noise_m"])
+    usbl_noise_rad: float = positive(_DEFAULTS["usbl_noise_rad"])
+    usbl_outliers: float = fraction(_DEFAULTS["usbl_outliers"])
+    usbl_outlier_m: float = not_negative(_DEFAULTS["usbl_outlier_m"])
+    usbl_sound_m_s: float = not_negative(_DEFAULTS["usbl_sound_m_s"])
+    usbl_latency_s: float = not_negative(_DEFAULTS["usbl_latency_s"])
+    usbl_dropout: float = fraction(_DEFAULTS["usbl_dropout"])
+    acceleration_psd: float = positive(_DEFAULTS["acceleration_psd"])
+    model_position: float = not_negative(_DEFAULTS["model_position"])
+    model_current: float = not_negative(_DEFAULTS["model_current"])
+    lookahead_m: float = positive(_DEFAULTS["lookahead_m"])
+    switch_m: float = positive(_DEFAULTS["switch_m"])
+    end_m: float = not_negative(_DEFAULTS["end_m"])
+    arc_m: float = not_negative(_DEFAULTS["arc_m"])
+    circle_s: float = positive(_DEFAULTS["circle_s"])
+    most_s: float = positive(_DEFAULTS["most_s"])
+    runs: int = integer(50, 1, 100_000)
+    seed: int = integer(1, 0, 2**64 - 1)
 
     def __post_init__(self) -> None:
-        set_field = object.__setattr__
-        as_kind("track", self.track, TRACKS)
-        as_kind("estimate", self.estimate, ESTIMATES)
-        as_kind("guidance", self.guidance, LAWS)
-        as_kind("dtype", self.dtype, ("float64", "float32"))
+        super().__post_init__()
         as_instance("interval", self.interval, IntervalPolicy.__args__)
         if self.guidance == "crab" and self.estimate in ("fixes", "ukf"):
             raise ValueError(
@@ -158,40 +163,13 @@ class Mission:
                 f"{self.estimate!r}"
             )
         if self.kernel is not None:
-            set_field(self, "kernel", as_kernel(self.kernel))
+            object.__setattr__(self, "kernel", as_kernel(self.kernel))
         if self.recovery is not None:
             as_instance("recovery", self.recovery, RejectionStreak)
             if self.kernel is None:
                 raise ValueError("recovery is for filters with a kernel")
-        for name in _DEFAULTS:
-            bound = "positive" if name in _POSITIVE else "not negative"
-            if name == "log_scale":
-                bound = "any"
-            value = getattr(self, name)
-            if name == "current_rad":
-                value = float("nan") if value != value else as_number(name, value)
-                set_field(self, name, value)
-                continue
-            number = as_number(name, value, bound)  # type: ignore[arg-type]
-            if name in ("usbl_outliers", "usbl_dropout") and number > 1:
-                raise ValueError(f"{name} is a probability and must lie in 0..1, not {number}")
-            set_field(self, name, number)
-        limits = {"runs": (1, 100_000), "seed": (0, 2**64 - 1), "degrees_of_freedom": (3, 6)}
-        for name, (low, high) in limits.items():
-            set_field(self, name, as_integer(name, getattr(self, name), low, high))
-
-
-_POSITIVE = (
-    "period_s",
-    "speed_m_s",
-    "usbl_noise_m",
-    "usbl_noise_rad",
-    "acceleration_psd",
-    "lookahead_m",
-    "switch_m",
-    "circle_s",
-    "most_s",
-)
+        if self.current_rad == self.current_rad:
+            object.__setattr__(self, "current_rad", as_number("current_rad", self.current_rad))
 
 
 @dataclass(frozen=True)
