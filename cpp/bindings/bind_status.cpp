@@ -13,7 +13,8 @@ void bind_status(py::module_& m) {
       .value("not_positive_definite", Status::kNotPositiveDefinite)
       .value("alpha_too_small", Status::kAlphaTooSmall)
       .value("overflow", Status::kOverflow);
-  m.def("describe", &describe, py::arg("status"), "One line of English for a status.");
+  m.def("describe", static_cast<const char* (*)(Status)>(&describe), py::arg("status"),
+        "One line of English for a status.");
 
   static py::exception<StatusError> error(m, "StatusError", PyExc_ValueError);
   py::register_exception_translator([](std::exception_ptr thrown) {
