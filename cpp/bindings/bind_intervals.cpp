@@ -12,7 +12,7 @@ AnyInterval<Scalar> checked(const AnyInterval<Scalar>& policy) {
 }
 
 template <class Scalar>
-void bind_precision(py::module_& m) {
+void bind_interval(py::module_& m) {
   using Policy = AnyInterval<Scalar>;
   using Kind = typename Policy::Kind;
   py::class_<Policy>(m, named<Scalar>("Interval").c_str(), "A policy for the sampling interval.")
@@ -51,8 +51,8 @@ void bind_precision(py::module_& m) {
 }  // namespace
 
 void bind_intervals(py::module_& m) {
-  bind_precision<float>(m);
-  bind_precision<double>(m);
+  bind_interval<float>(m);
+  bind_interval<double>(m);
   m.def("fixed_interval_defaults", [] { return to_dict(FixedInterval<double>::Params()); });
   m.def("covariance_budget_defaults", [] { return to_dict(CovarianceBudget<double>::Params()); });
   m.def(

@@ -24,7 +24,7 @@ py::array_t<Scalar> map(const Array<Scalar>& t, Function function) {
 }
 
 template <class Scalar>
-void bind_precision(py::module_& m) {
+void bind_kernel(py::module_& m) {
   using Any = AnyKernel<Scalar>;
   py::class_<Any>(m, named<Scalar>("Kernel").c_str(), "A robust kernel.")
       .def_static("unit", &make<Unit<Scalar>>, py::arg("params"), "Least squares.")
@@ -48,8 +48,8 @@ void bind_precision(py::module_& m) {
 }  // namespace
 
 void bind_kernels(py::module_& m) {
-  bind_precision<float>(m);
-  bind_precision<double>(m);
+  bind_kernel<float>(m);
+  bind_kernel<double>(m);
   m.def("kernel_defaults", [] {
     py::dict result;
     result["unit"] = to_dict(Unit<double>::Params());

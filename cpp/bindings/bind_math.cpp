@@ -27,7 +27,7 @@ void bind_unary(py::module_& m, const char* name, const char* doc, Function func
 }
 
 template <class Scalar>
-void bind_precision(py::module_& m) {
+void bind_functions(py::module_& m) {
   bind_unary<Scalar>(m, "sin", "sin(x), x in rad.", [](Scalar x) { return math::sin(x); });
   bind_unary<Scalar>(m, "cos", "cos(x), x in rad.", [](Scalar x) { return math::cos(x); });
   bind_unary<Scalar>(m, "exp", "exp(x).", [](Scalar x) { return math::exp(x); });
@@ -51,8 +51,8 @@ void bind_precision(py::module_& m) {
 }  // namespace
 
 void bind_math(py::module_& m) {
-  bind_precision<float>(m);
-  bind_precision<double>(m);
+  bind_functions<float>(m);
+  bind_functions<double>(m);
 }
 
 }  // namespace bindings

@@ -17,7 +17,7 @@ py::array_t<Scalar> filled(py::ssize_t count, Draw draw) {
 }
 
 template <class Scalar>
-void bind_precision(py::class_<math::Random>& c) {
+void bind_draws(py::class_<math::Random>& c) {
   c.def(
       named<Scalar>("uniform").c_str(),
       [](math::Random& random, py::ssize_t count) {
@@ -53,8 +53,8 @@ void bind_random(py::module_& m) {
       },
       py::arg("words").noconvert());
   c.def("next_u32", &math::Random::next_u32, "32 random bits.");
-  bind_precision<float>(c);
-  bind_precision<double>(c);
+  bind_draws<float>(c);
+  bind_draws<double>(c);
 }
 
 }  // namespace bindings

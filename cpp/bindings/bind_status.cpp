@@ -15,7 +15,8 @@ void bind_status(py::module_& m) {
       .value("overflow", Status::kOverflow)
       .value("unstable_step", Status::kUnstableStep)
       .value("steep_pitch", Status::kSteepPitch);
-  m.def("describe", &describe, py::arg("status"), "One line of English for a status.");
+  m.def("describe", static_cast<const char* (*)(Status)>(&describe), py::arg("status"),
+        "One line of English for a status.");
 
   static py::exception<StatusError> error(m, "StatusError", PyExc_ValueError);
   py::register_exception_translator([](std::exception_ptr thrown) {

@@ -37,12 +37,15 @@ does. Compile with -msse2 -mfpmath=sse."
 static_assert(sizeof(float) == 4 && FLT_RADIX == 2 && FLT_MANT_DIG == 24,
               "auvest needs IEEE 754 binary32 as float");
 
-// A fixed trip count, written out by the compiler. It changes speed, never the order of operations.
+// A fixed trip count, written out by the compiler. It changes speed, never the order of operations:
+// where compiling takes longer than it is worth, a build may define it as nothing.
 // (clang unrolls such loops by itself; gcc without optimisation would warn that it does not.)
+#if !defined(AUVEST_UNROLL)
 #if __GNUC__ >= 8 && !defined(__clang__) && !defined(__AVR__) && defined(__OPTIMIZE__)
 #define AUVEST_UNROLL _Pragma("GCC unroll 16")
 #else
 #define AUVEST_UNROLL
+#endif
 #endif
 
 // Small kernels that must disappear into their caller.
