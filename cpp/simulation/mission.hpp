@@ -200,6 +200,19 @@ struct MissionResult {
   std::uint32_t refused = 0;  ///< fixes that the filter did not take
 };
 
+/// What the sensors told the vehicle in a step; NaN: nothing, and without noise all of it.
+struct MissionReadings {
+  double compass_rad = std::numeric_limits<double>::quiet_NaN();
+  double pitch_rate_rad_s = std::numeric_limits<double>::quiet_NaN();
+  double yaw_rate_rad_s = std::numeric_limits<double>::quiet_NaN();
+  double depth_m = std::numeric_limits<double>::quiet_NaN();
+  double log_m_s[2] = {std::numeric_limits<double>::quiet_NaN(),
+                       std::numeric_limits<double>::quiet_NaN()};
+  double pitch_rad = std::numeric_limits<double>::quiet_NaN();  ///< as it is
+  double fix[2] = {std::numeric_limits<double>::quiet_NaN(),    ///< range [m], bearing [rad]
+                   std::numeric_limits<double>::quiet_NaN()};
+};
+
 /// One step, after its command.
 struct MissionStep {
   const VehicleTruth& truth;
@@ -215,6 +228,7 @@ struct MissionStep {
   double nis;            ///< of that fix
   double nees_position;  ///< of the estimate, 2 on average; NaN without a filter
   double nees;           ///< of all states that the truth has: 4 on average; NaN without
+  const MissionReadings& readings;
 };
 
 namespace detail {
@@ -757,6 +771,8 @@ MissionResult fly_with(const MissionScenario& s, std::uint64_t seed, std::uint32
     if (truth.time_s >= most - 1e-9) break;
 
     // The sensors read.
+    MissionReadings told;
+    told.pitch_rad = truth.pose[4];
     now.pitch_rad = Scalar(truth.pose[4]);
     if (exact) {
       now.heading_rad = Scalar(math::wrap(truth.pose[5]));
@@ -771,12 +787,15 @@ MissionResult fly_with(const MissionScenario& s, std::uint64_t seed, std::uint32
       log.sample(truth);
       Reading<3> rates;
       while (gyro.take(truth.time_s, rates)) {
+        told.pitch_rate_rad_s = rates.value[1];
+        told.yaw_rate_rad_s = rates.value[2];
         now.pitch_rate_rad_s = Scalar(rates.value[1]);
         now.yaw_rate_rad_s = Scalar(rates.value[2]);
       }
       if (k > 0) heading_filter.predict(now.yaw_rate_rad_s, dt);
       Reading<1> number;
       while (compass.take(truth.time_s, number)) {
+        told.compass_rad = number.value[0];
         const Scalar psi = Scalar(number.value[0]);
         if (heading_filter.initialised()) {
           heading_filter.update(psi);
@@ -785,9 +804,13 @@ MissionResult fly_with(const MissionScenario& s, std::uint64_t seed, std::uint32
         }
       }
       now.heading_rad = heading_filter.heading_rad();
-      while (depth.take(truth.time_s, number)) now.depth_m = Scalar(number.value[0]);
+      while (depth.take(truth.time_s, number)) {
+        told.depth_m = number.value[0];
+        now.depth_m = Scalar(number.value[0]);
+      }
       Reading<2> speeds;
       while (log.take(truth.time_s, speeds)) {
+        for (int i = 0; i < 2; ++i) told.log_m_s[i] = speeds.value[i];
         now.speed_m_s = Scalar(speeds.value[0]);
         input(0) = Scalar(speeds.value[0]);
         input(1) = Scalar(speeds.value[1]);
@@ -812,6 +835,7 @@ MissionResult fly_with(const MissionScenario& s, std::uint64_t seed, std::uint32
       }
       Reading<2> fix;
       while (usbl.take(truth.time_s, fix)) {
+        for (int i = 0; i < 2; ++i) told.fix[i] = fix.value[i];
         Vector<Scalar, 2> z;
         z(0) = Scalar(fix.value[0]);
         z(1) = Scalar(fix.value[1]);
@@ -878,7 +902,8 @@ MissionResult fly_with(const MissionScenario& s, std::uint64_t seed, std::uint32
         fixed,
         fixed ? navigator.nis : std::numeric_limits<double>::quiet_NaN(),
         0,
-        0};
+        0,
+        told};
     navigator.judge(truth, current, step.nees_position, step.nees);
     sink(static_cast<const MissionStep&>(step));
 
