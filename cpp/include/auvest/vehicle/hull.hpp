@@ -166,10 +166,10 @@ class Hull {
     motion_rate(a, x, demand, dx);
   }
 
-  /// dnu = d(nu_r)/dt from the velocities through the water and the state of the actuators.
+  /// d(nu_r)/dt from the velocities through the water and the state of the actuators.
   template <class Value>
   AUVEST_OUTLINE AUVEST_INLINE void acceleration(const Attitude<Value>& a, const Value* velocities,
-                                                 const Value* actuators, Value* dnu) const {
+                                                 const Value* actuators, Value* rate) const {
     Value tau[6];
     forces(a, velocities, actuators, tau);
     AUVEST_UNROLL
@@ -180,7 +180,7 @@ class Hull {
         if (inverse_(i, j) == Scalar(0)) continue;
         sum = sum + Value(inverse_(i, j)) * tau[Freedom::axis(j)];
       }
-      dnu[i] = sum;  // [AUKF 3]
+      rate[i] = sum;  // [AUKF 3]
     }
   }
 

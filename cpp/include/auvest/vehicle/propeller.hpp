@@ -85,10 +85,10 @@ struct Propeller {
   /// The speed [rev/s] that gives the hull a force [N] at `u` m/s through the water: the inverse of
   /// the curve, up to the limits of the shaft. Of the two speeds that brake, the negative one.
   Scalar speed_for(Scalar force, Scalar u) const {
-    const Scalar wanted = force / params.thrust_deduction;
-    if (wanted <= Scalar(0)) return shaft.limited(-math::sqrt(-wanted / thrust_n_));
+    const Scalar thrust = force / params.thrust_deduction;
+    if (thrust <= Scalar(0)) return shaft.limited(-math::sqrt(-thrust / thrust_n_));
     const Scalar half = Scalar(0.5) * thrust_va_ * advance(Scalar(1), u);
-    const Scalar root = math::sqrt(half * half + thrust_n_ * wanted);
+    const Scalar root = math::sqrt(half * half + thrust_n_ * thrust);
     return shaft.limited((root - half) / thrust_n_);  // [HULL P3]
   }
 
