@@ -76,6 +76,10 @@ inline ExplicitDouble log(ExplicitDouble x) { return ExplicitDouble(log(double(x
 inline ExplicitDouble exp_normal(ExplicitDouble x) { return exp(x); }
 inline ExplicitDouble log_normal(ExplicitDouble x) { return log(x); }
 inline ExplicitDouble sqrt(ExplicitDouble x) { return ExplicitDouble(sqrt(double(x))); }
+inline ExplicitDouble absolute(ExplicitDouble x) { return ExplicitDouble(absolute(double(x))); }
+inline ExplicitDouble copy_sign(ExplicitDouble x, ExplicitDouble y) {
+  return ExplicitDouble(copy_sign(double(x), double(y)));
+}
 inline bool is_finite(ExplicitDouble x) { return is_finite(double(x)); }
 inline ExplicitDouble wrap(ExplicitDouble x) { return ExplicitDouble(wrap(double(x))); }
 inline ExplicitDouble atan2(ExplicitDouble y, ExplicitDouble x) {

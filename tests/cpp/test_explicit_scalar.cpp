@@ -301,4 +301,60 @@ TEST_CASE("explicit scalar: the SLAT filters compute the bits of double") {
   CHECK(Slat<ExplicitDouble>::all() == Slat<double>::all());
 }
 
+/// Two steps of each kind, and the largest step there.
+template <class Hull>
+void fly(const Hull& hull, typename Hull::Command command, std::vector<double>& numbers) {
+  using Scalar = typename Hull::Scalar;
+  typename Hull::Current current;
+  current(0) = Scalar(0.3);
+  current(1) = Scalar(-0.2);
+  current(2) = Scalar(0.1);
+  REQUIRE(hull.check() == auvest::Status::kOk);
+  typename Hull::State x = hull.at_rest(current);
+  const Scalar h(0.05);
+  for (int k = 0; k < 2; ++k) {
+    REQUIRE(auvest::advance<auvest::Rk4>(hull, x, command, current, h) == auvest::Status::kOk);
+    REQUIRE(auvest::advance<auvest::SemiImplicit>(hull, x, command, current, h) ==
+            auvest::Status::kOk);
+  }
+  for (int i = 0; i < Hull::kStates; ++i) numbers.push_back(double(x(i)));
+  numbers.push_back(double(auvest::largest_stable_step<auvest::Rk4>(hull, x, command)));
+}
+
+template <class Scalar>
+std::vector<double> fly_vehicles() {
+  std::vector<double> numbers;
+  using Keel = auvest::Keel<Scalar>;
+  using Torpedo = auvest::Torpedo<Scalar, Keel>;
+  typename Torpedo::Params torpedo = auvest::remus100<Scalar, Keel>();
+  torpedo.keel.foil.area_m2 = Scalar(0.02);
+  auvest::Vector<Scalar, 3> fins;
+  fins(0) = fins(1) = Scalar(0.1);
+  fins(2) = Scalar(15);
+  fly(auvest::Hull<Torpedo>(torpedo), fins, numbers);
+  fly(auvest::Hull<Torpedo, auvest::ThreeDof>(torpedo), fins, numbers);
+
+  const auvest::Hull<auvest::Rov<Scalar, 8>> rov(auvest::bluerov2_heavy<Scalar>());
+  const auto& thrusters = rov.vehicle().thrusters;
+  auvest::Vector<Scalar, 6> demand;
+  for (int i = 0; i < 6; ++i) demand(i) = Scalar(i < 3 ? 90 : 1);
+  const auto allocated = auvest::allocation_of(thrusters).allocate(demand);
+  CHECK(allocated.saturated);
+  auvest::Vector<Scalar, 8> inputs;
+  for (int i = 0; i < 8; ++i) inputs(i) = thrusters.curve.input(allocated.thrust(i));
+  fly(rov, inputs, numbers);
+  auvest::Vector<Scalar, 8> thrust;
+  numbers.push_back(auvest::redistribute(thrusters.matrix(), demand, thrusters.curve.lowest(),
+                                         thrusters.curve.highest(), thrust));
+  numbers.push_back(double(auvest::Torpedo<Scalar>(auvest::remus100<Scalar>())
+                               .propeller.speed_for(Scalar(5), Scalar(1))));
+  const auvest::Spheroid<Scalar> shape = {Scalar(0.8), Scalar(0.1), Scalar(1026)};
+  numbers.push_back(double(shape.added_mass().sway_kg));
+  return numbers;
+}
+
+TEST_CASE("explicit scalar: the vehicles") {
+  CHECK(fly_vehicles<ExplicitDouble>() == fly_vehicles<double>());
+}
+
 }  // namespace

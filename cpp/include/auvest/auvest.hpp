@@ -74,4 +74,5 @@
 #include "auvest/vehicle/remus100.hpp"
 #include "auvest/vehicle/rov.hpp"
 #include "auvest/vehicle/spheroid.hpp"
+#include "auvest/vehicle/stable_step.hpp"
 #include "auvest/vehicle/torpedo.hpp"

@@ -44,7 +44,7 @@ Matrix<Scalar, Count, 6> pseudo_inverse(const Matrix<Scalar, 6, Count>& T,
     }
   }
   Vector<Scalar, 6> pivots;
-  const Scalar any_size = std::numeric_limits<Scalar>::lowest();
+  const Scalar any_size(std::numeric_limits<Scalar>::lowest());
   math::ldlt<detail::DropDependentAxes>(l.data(), 6, any_size, pivots.data());
   Matrix<Scalar, Count, 6> B;
   for (int column = 0; column < 6; ++column) {
@@ -103,7 +103,7 @@ class Allocation {
 
   Params params;
 
-  Allocation(const Inverse& inverse, const Params& p) : params(p) { math::copy(inverse, inverse_); }
+  Allocation(const Inverse& B, const Params& p) : params(p) { math::copy(B, inverse_); }
 
   const Inverse& inverse() const { return inverse_; }
 

@@ -126,13 +126,13 @@ class Hull {
   // ------------------------------------------------
 
   template <class Value>
-  static AUVEST_INLINE Attitude<Value> attitude(const Vector<Value, kStates>& x) {
+  static Attitude<Value> attitude(const Vector<Value, kStates>& x) {
     return Attitude<Value>::of(x.data(), Freedom());
   }
 
   /// What the actuators make of a command.
   template <class Value>
-  AUVEST_INLINE Vector<Value, kActuators> demands(const Vector<Value, kActuators>& command) const {
+  Vector<Value, kActuators> demands(const Vector<Value, kActuators>& command) const {
     Vector<Value, kActuators> demand;
     vehicle_.demands(command.data(), demand.data());
     return demand;
@@ -140,8 +140,8 @@ class Hull {
 
   /// The rates of the pose, into dx.
   template <class Value>
-  AUVEST_INLINE void pose_rate(const Attitude<Value>& a, const Vector<Value, kStates>& x,
-                               const Vector<Value, 3>& current, Vector<Value, kStates>& dx) const {
+  void pose_rate(const Attitude<Value>& a, const Vector<Value, kStates>& x,
+                 const Vector<Value, 3>& current, Vector<Value, kStates>& dx) const {
     Flow<Value> flow;
     flow.set(x.data() + kVelocities, false, Freedom());
     pose_rates<Freedom>(a, flow.nu, current.data(), dx.data());
@@ -149,9 +149,8 @@ class Hull {
 
   /// The rates of velocities and actuators, into dx.
   template <class Value>
-  AUVEST_INLINE void motion_rate(const Attitude<Value>& a, const Vector<Value, kStates>& x,
-                                 const Vector<Value, kActuators>& demand,
-                                 Vector<Value, kStates>& dx) const {
+  void motion_rate(const Attitude<Value>& a, const Vector<Value, kStates>& x,
+                   const Vector<Value, kActuators>& demand, Vector<Value, kStates>& dx) const {
     const Value* const actuators = x.data() + 2 * kVelocities;
     acceleration(a, x.data() + kVelocities, actuators, dx.data() + kVelocities);
     vehicle_.actuator_rates(actuators, demand.data(), dx.data() + 2 * kVelocities);
@@ -159,8 +158,8 @@ class Hull {
 
   /// dx = f(x), with the demands of a command.
   template <class Value>
-  AUVEST_INLINE void rate(const Vector<Value, kStates>& x, const Vector<Value, kActuators>& demand,
-                          const Vector<Value, 3>& current, Vector<Value, kStates>& dx) const {
+  void rate(const Vector<Value, kStates>& x, const Vector<Value, kActuators>& demand,
+            const Vector<Value, 3>& current, Vector<Value, kStates>& dx) const {
     const Attitude<Value> a = attitude(x);
     pose_rate(a, x, current, dx);
     motion_rate(a, x, demand, dx);
@@ -168,8 +167,8 @@ class Hull {
 
   /// d(nu_r)/dt from the velocities through the water and the state of the actuators.
   template <class Value>
-  AUVEST_OUTLINE AUVEST_INLINE void acceleration(const Attitude<Value>& a, const Value* velocities,
-                                                 const Value* actuators, Value* rate) const {
+  AUVEST_OUTLINE void acceleration(const Attitude<Value>& a, const Value* velocities,
+                                   const Value* actuators, Value* result) const {
     Value tau[6];
     forces(a, velocities, actuators, tau);
     AUVEST_UNROLL
@@ -180,14 +179,14 @@ class Hull {
         if (inverse_(i, j) == Scalar(0)) continue;
         sum = sum + Value(inverse_(i, j)) * tau[Freedom::axis(j)];
       }
-      rate[i] = sum;  // [AUKF 3]
+      result[i] = sum;  // [AUKF 3]
     }
   }
 
   /// tau - C nu_r - D nu_r - g, on the axes that are kept.
   template <class Value>
-  AUVEST_OUTLINE AUVEST_INLINE void forces(const Attitude<Value>& a, const Value* velocities,
-                                           const Value* actuators, Value* tau) const {
+  AUVEST_OUTLINE void forces(const Attitude<Value>& a, const Value* velocities,
+                             const Value* actuators, Value* tau) const {
     Flow<Value> flow;
     flow.set(velocities, Vehicle::kNeedsSpeed, Freedom());
     math::set_zero(tau, 6);

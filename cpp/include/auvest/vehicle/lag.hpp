@@ -66,8 +66,8 @@ struct Lag {
   }
 
   template <class Value>
-  AUVEST_INLINE Value rate(const Value& state, const Value& demand) const {
-    const Value free = (demand - state) / Value(params.time_constant_s);  // [HULL A1]
+  AUVEST_INLINE Value rate(const Value& state, const Value& wanted) const {
+    const Value free = (wanted - state) / Value(params.time_constant_s);  // [HULL A1]
     if (params.rate_limit == Scalar(0)) return free;
     return clamp_to(free, Value(-params.rate_limit), Value(params.rate_limit));
   }

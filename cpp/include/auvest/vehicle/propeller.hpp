@@ -75,8 +75,7 @@ struct Propeller {
 
   /// The force on the hull, thrust_deduction T, and the torque that rolls it.
   template <class Freedom, class Value>
-  AUVEST_OUTLINE AUVEST_INLINE void add_to(Value* tau, const Flow<Value>& flow, const Value& n,
-                                           Freedom) const {
+  AUVEST_OUTLINE void add_to(Value* tau, const Flow<Value>& flow, const Value& n, Freedom) const {
     tau[kSurge] = tau[kSurge] + Value(params.thrust_deduction) * thrust(n, flow.nu[kSurge]);
     if (!Freedom::keeps(kRoll) || params.roll_torque == Scalar(0)) return;
     tau[kRoll] = tau[kRoll] + Value(params.roll_torque) * torque(n, flow.nu[kSurge]);
@@ -85,10 +84,10 @@ struct Propeller {
   /// The speed [rev/s] that gives the hull a force [N] at `u` m/s through the water: the inverse of
   /// the curve, up to the limits of the shaft. Of the two speeds that brake, the negative one.
   Scalar speed_for(Scalar force, Scalar u) const {
-    const Scalar thrust = force / params.thrust_deduction;
-    if (thrust <= Scalar(0)) return shaft.limited(-math::sqrt(-thrust / thrust_n_));
+    const Scalar wanted = force / params.thrust_deduction;
+    if (wanted <= Scalar(0)) return shaft.limited(-math::sqrt(-wanted / thrust_n_));
     const Scalar half = Scalar(0.5) * thrust_va_ * advance(Scalar(1), u);
-    const Scalar root = math::sqrt(half * half + thrust_n_ * thrust);
+    const Scalar root = math::sqrt(half * half + thrust_n_ * wanted);
     return shaft.limited((root - half) / thrust_n_);  // [HULL P3]
   }
 

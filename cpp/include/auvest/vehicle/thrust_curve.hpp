@@ -54,6 +54,7 @@ struct OddThrust {
   /// By bisection and Newton steps within the bracket, to the last digits.
   AUVEST_OUTLINE Scalar input(Scalar f) const {
     const Scalar wanted = math::absolute(f);
+    if (wanted == Scalar(0)) return Scalar(0);
     if (wanted >= highest_) return math::copy_sign(params.limit, f);
     Scalar low = Scalar(0), high = params.limit;
     Scalar c = Scalar(0.5) * high;

@@ -75,13 +75,13 @@ struct Thrusters {
 
   /// The thrusts [N] that inputs ask for.
   template <class Value>
-  AUVEST_INLINE void demands(const Value* inputs, Value* thrusts) const {
+  void demands(const Value* inputs, Value* thrusts) const {
     for (int i = 0; i < Count; ++i) thrusts[i] = curve.thrust(inputs[i]);
   }
 
   /// tau <- tau + T f.
   template <class Freedom, class Value>
-  AUVEST_OUTLINE AUVEST_INLINE void add_to(Value* tau, const Value* thrusts, Freedom) const {
+  AUVEST_OUTLINE void add_to(Value* tau, const Value* thrusts, Freedom) const {
     AUVEST_UNROLL
     for (int i = 0; i < 6; ++i) {
       if (!Freedom::keeps(i)) continue;
@@ -106,13 +106,13 @@ struct Thrusters {
   }
 
  private:
-  static typename Lag<Scalar>::Params lag_params(const Params& p, const Curve& curve) {
-    typename Lag<Scalar>::Params lag;
-    lag.low = curve.lowest();
-    lag.high = curve.highest();
-    lag.time_constant_s = p.time_constant_s;
-    lag.rate_limit = p.rate_limit_n_s;
-    return lag;
+  static typename Lag<Scalar>::Params lag_params(const Params& p, const Curve& reach) {
+    typename Lag<Scalar>::Params of_thrust;
+    of_thrust.low = reach.lowest();
+    of_thrust.high = reach.highest();
+    of_thrust.time_constant_s = p.time_constant_s;
+    of_thrust.rate_limit = p.rate_limit_n_s;
+    return of_thrust;
   }
 
   Matrix6 matrix_;
