@@ -308,10 +308,6 @@ class RovRecord(Record):
 
 # ---- The records ---------------------------------------------------------------------------------
 
-#: Steps of 600 s.
-STEPS = 6000
-
-
 def _zigzag(steps: int, h: float) -> Rows:
     """Full rudder to either side, the nose up and down, the propeller ahead and astern."""
     t = h * np.arange(steps)
@@ -324,8 +320,8 @@ def _zigzag(steps: int, h: float) -> Rows:
 def _stations() -> Rows:
     """Every 40 s another place and heading; some so far that the thrusters are at their limits."""
     places = np.array([[0, 0, 0, 0], [1, -0.5, 0.5, 1.57], [6, 4, 3, -3.0], [6, 4, 3, 3.0]])
-    rows = np.zeros((STEPS, 6), "<f4")
-    rows[:, [0, 1, 2, 5]] = places[np.arange(STEPS) // 400 % len(places)]
+    rows = np.zeros((1600, 6), "<f4")
+    rows[:, [0, 1, 2, 5]] = places[np.arange(len(rows)) // 400]
     return rows
 
 
