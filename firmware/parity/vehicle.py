@@ -153,12 +153,16 @@ class MissionRecord(Record):
         flight = self.arc_m, self.speed_m_s, self.seconds, self.outliers, self.seed
         return _fly(*names, self.rejections, *flight)
 
+    @property
+    def readings(self) -> Rows:
+        """What the sensors told alone, dtype READING."""
+        readings = np.zeros(len(self.rows), READING)
+        for name in READING.names or ():
+            readings[name] = self.rows[name]
+        return readings
+
     def to_bytes(self) -> bytes:
         """Return the record as the replay programs read it."""
-        steps = self.rows
-        readings = np.zeros(len(steps), READING)
-        for name in READING.names or ():
-            readings[name] = steps[name]
         kinds = _KINDS.index("mission"), _LAWS.index(self.law), _TRACKS.index(self.track)
         return b"".join(
             [
@@ -166,8 +170,8 @@ class MissionRecord(Record):
                 _numbers(self.arc_m, self.speed_m_s, 5.0, PERIOD_S),
                 _words(_KERNELS.index(self.kernel), self.rejections),
                 _numbers(self.start_m, [0.0, 0.0]),
-                _words(len(steps)),
-                readings.tobytes(),
+                _words(len(self.rows)),
+                self.readings.tobytes(),
             ]
         )
 
@@ -308,7 +312,7 @@ class RovRecord(Record):
 
 # ---- The records ---------------------------------------------------------------------------------
 
-def _zigzag(steps: int, h: float) -> Rows:
+def zigzag(steps: int, h: float) -> Rows:
     """Full rudder to either side, the nose up and down, the propeller ahead and astern."""
     t = h * np.arange(steps)
     rudder = np.where(t % 14 < 7, 0.3, -0.3)  # beyond the limit of 15 degrees
@@ -355,7 +359,7 @@ def all_records() -> tuple[Record, ...]:
             name="hull6-zigzag",
             freedom=6,
             method="rk4",
-            commands=_zigzag(800, 0.05),
+            commands=zigzag(800, 0.05),
             start=_f4(turning),
             h=0.05,
             current_m_s=(0.4, 0.3, 0.1),
@@ -364,7 +368,7 @@ def all_records() -> tuple[Record, ...]:
             name="hull6-semi-implicit",
             freedom=6,
             method="semi-implicit",
-            commands=_zigzag(2000, 0.02),
+            commands=zigzag(2000, 0.02),
             start=_f4(turning),
             h=0.02,
         ),
@@ -372,7 +376,7 @@ def all_records() -> tuple[Record, ...]:
             name="hull3-semi-implicit",
             freedom=3,
             method="semi-implicit",
-            commands=_zigzag(2000, 0.02),
+            commands=zigzag(2000, 0.02),
             start=_f4(plane),
             h=0.02,
         ),
