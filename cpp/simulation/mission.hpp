@@ -82,7 +82,11 @@ struct MissionScenario {
   double depth_m = 5;
   double current_m_s = 0.3;
   double current_rad = std::numeric_limits<double>::quiet_NaN();  ///< towards; NaN: drawn per run
-  double initial_error_m = 1;                                     ///< of the estimate, per axis
+  /// Random walk of the current in the world [m^2/s^3]; 0: it is constant, of the magnitude above
+  double current_walk = 0;
+  /// With a walk: the current at the start is drawn with this deviation per axis [m/s]
+  double current_sigma_m_s = 0.3;
+  double initial_error_m = 1;  ///< of the estimate, per axis
 
   CompassDevice compass;
   GyroDevice gyro;
@@ -159,6 +163,10 @@ inline MissionScenario mission_source(MissionSource source, MissionTrack track,
   if (source == Source::kUkfOutliers || source == Source::kModelAidedOutliers ||
       source == Source::kRobustModelAidedOutliers) {
     s.usbl.outliers = 0.05;
+  }
+  // The rows of the prototype's own filter have the prototype's noise; the robust ones the default.
+  if (source >= Source::kModelAided && source <= Source::kModelAidedOutliers) {
+    s.model.position = 0.02;
   }
   if (source == Source::kUkfDefaultPsd) {
     s.acceleration_psd = AccelerationNoise<double>().acceleration;
@@ -667,6 +675,11 @@ class MissionHull {
 
   const VehicleTruth& truth() const { return truth_; }
 
+  void set_current(const double* stream) {
+    current_(0) = stream[0];
+    current_(1) = stream[1];
+  }
+
   Status advance(const double* command, double dt, double time_s) {
     typename Body::Command c;
     for (int i = 0; i < 3; ++i) c(i) = command[i];
@@ -719,8 +732,15 @@ MissionResult fly_with(const MissionScenario& s, std::uint64_t seed, std::uint32
   double error[2];
   world.normal_pair(error[0], error[1]);
   const double towards = s.current_rad == s.current_rad ? s.current_rad : drawn;
-  const double current[2] = {s.current_m_s * math::cos(towards),
-                             s.current_m_s * math::sin(towards)};
+  math::Random drift(seed, stream + 6);
+  double current[2];
+  if (s.current_walk > 0) {
+    drift.normal_pair(current[0], current[1]);
+    for (double& component : current) component *= s.current_sigma_m_s;
+  } else {
+    current[0] = s.current_m_s * math::cos(towards);
+    current[1] = s.current_m_s * math::sin(towards);
+  }
 
   MissionPath<Scalar> path(s);
   double start[2];
@@ -907,6 +927,13 @@ MissionResult fly_with(const MissionScenario& s, std::uint64_t seed, std::uint32
     navigator.judge(truth, current, step.nees_position, step.nees);
     sink(static_cast<const MissionStep&>(step));
 
+    if (s.current_walk > 0) {
+      double push[2];
+      drift.normal_pair(push[0], push[1]);
+      const double size = math::sqrt(s.current_walk * s.period_s);
+      for (int i = 0; i < 2; ++i) current[i] += size * push[i];
+      hull.set_current(current);
+    }
     result.status = hull.advance(command, s.period_s, (k + 1) * s.period_s);
     if (result.status != Status::kOk) return result;
   }

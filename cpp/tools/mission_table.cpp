@@ -87,16 +87,18 @@ const Row kRows[] = {
      {kNone, kNone}},
 };
 
-/// mean +- error, and behind it the prototype's with their distance in standard errors.
+/// mean +- error, and behind it the prototype's; where that has an error too, their distance in
+/// standard errors.
 void print(const Mean& mean, double value, double error) {
-  std::printf("  %6.3f+-%.3f", mean.value(), mean.error());
-  if (std::isnan(value)) {
-    std::printf(" %19s", "");
-    return;
-  }
+  std::printf(" %6.3f +- %.3f", mean.value(), mean.error());
   const double both = std::sqrt(mean.error() * mean.error() + error * error);
-  std::printf(" (%.3f%s%5.1f s)", value, error > 0 ? "" : "*",
-              both > 0 ? (mean.value() - value) / both : 0.0);
+  if (std::isnan(value)) {
+    std::printf("%14s", "");
+  } else if (error > 0 && both > 0) {
+    std::printf(" (%.3f, %4.1f)", value, (mean.value() - value) / both);
+  } else {
+    std::printf(" (%.3f)%6s", value, "");
+  }
 }
 
 }  // namespace
@@ -104,11 +106,12 @@ void print(const Mean& mean, double value, double error) {
 int main(int argc, char** argv) {
   const int runs = argc > 1 ? std::atoi(argv[1]) : 50;
   const std::uint64_t seed = argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 1;
-  std::printf("%d runs, seed %llu; in brackets the prototype and the distance from it\n", runs,
-              static_cast<unsigned long long>(seed));
+  std::printf(
+      "%d runs, seed %llu; in brackets the prototype, and how many standard errors lie between\n",
+      runs, static_cast<unsigned long long>(seed));
   for (int circle = 0; circle < 2; ++circle) {
-    std::printf("%s: settled, all, position error (m), interval (s), rudder travel (deg/s)\n",
-                circle != 0 ? "circle" : "lawnmower");
+    std::printf("%-32s settled [m]%17s all [m]%21s position [m]%9s interval [s], rudder [deg/s]\n",
+                circle != 0 ? "circle" : "lawnmower", "", "", "");
     for (const Row& row : kRows) {
       const auto track = circle != 0 ? MissionTrack::kCircle : MissionTrack::kLawnmower;
       const auto scenario = auvest::mission_source(row.source, track, row.interval_s);

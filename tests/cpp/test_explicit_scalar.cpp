@@ -357,4 +357,92 @@ TEST_CASE("explicit scalar: the vehicles") {
   CHECK(fly_vehicles<ExplicitDouble>() == fly_vehicles<double>());
 }
 
+/// Guidance and control over a plan, with the model-aided filter between them.
+template <class Scalar>
+std::vector<double> run_guidance() {
+  using Process = auvest::SpeedHeadingCurrent<Scalar>;
+  std::vector<double> numbers;
+  const auvest::Waypoint<Scalar> plan[] = {
+      {Scalar(0), Scalar(0)}, {Scalar(60), Scalar(0)}, {Scalar(60), Scalar(50)}};
+  typename auvest::Waypoints<Scalar>::Params p;
+  p.arc_m = Scalar(18);
+  p.end_radius_m = Scalar(-20);
+  auvest::Waypoints<Scalar> path(p);
+  REQUIRE(path.start(plan, 3) == auvest::Status::kOk);
+  auvest::Ekf<Process> filter{Process()};
+  auvest::Vector<Scalar, 4> x;
+  auvest::Matrix<Scalar, 4, 4> P;
+  for (int i = 0; i < 4; ++i) {
+    x(i) = Scalar(0);
+    for (int j = 0; j < 4; ++j) P(i, j) = Scalar(i == j ? 1 : 0);
+  }
+  REQUIRE(filter.reset(x, P) == auvest::Status::kOk);
+  auvest::LineOfSight<Scalar> sight;
+  auvest::IntegralLineOfSight<Scalar> integral;
+  auvest::AdaptiveLineOfSight<Scalar> adaptive;
+  auvest::CrabFeedForward<Scalar> crab;
+  auvest::VectorField<Scalar> field;
+  auvest::VerticalLineOfSight<Scalar> vertical;
+  auvest::ReferenceModel<Scalar> model;
+  auvest::HeadingSlidingMode<Scalar> sliding;
+  auvest::HeadingFilter<Scalar> heading;
+  auvest::Autopilot<Scalar> autopilot;
+  auvest::PoseControl<Scalar> pose;
+  REQUIRE(heading.restart(Scalar(0.1)) == auvest::Status::kOk);
+  auvest::PathPoint<Scalar> point;
+  auvest::GuidanceCommand<Scalar> wanted;
+  auvest::AutopilotReadings<Scalar> now;
+  auvest::TorpedoCommand<Scalar> out;
+  auvest::Reference<Scalar> reference;
+  auvest::Vector<Scalar, 6> pose_now, rest, tau;
+  for (int i = 0; i < 6; ++i) {
+    pose_now(i) = Scalar(0.1 * i);
+    rest(i) = Scalar(0);
+  }
+  Scalar pitch = Scalar(0);
+  Scalar rudder = Scalar(0);
+  const Scalar dt = Scalar(0.1);
+  const Scalar speed = Scalar(1.5);
+  for (int k = 0; k < 900; ++k) {
+    auvest::Vector<Scalar, 3> motion;
+    motion(0) = speed;
+    motion(1) = Scalar(0.02);
+    motion(2) = heading.heading_rad();
+    REQUIRE(filter.predict(dt, motion) == auvest::Status::kOk);
+    REQUIRE(path.locate(filter.x()(0), filter.x()(1), point) == auvest::Status::kOk);
+    REQUIRE(crab.set_current(filter.x()(2), filter.x()(3)) == auvest::Status::kOk);
+    const auvest::Status laws[] = {sight.update(point, speed, dt, wanted),
+                                   integral.update(point, speed, dt, wanted),
+                                   field.update(point, speed, dt, wanted),
+                                   crab.update(point, speed, dt, wanted),
+                                   adaptive.update(point, speed, dt, wanted),
+                                   vertical.update(Scalar(0.1), point.cross_m, dt, pitch),
+                                   model.update(wanted.heading_rad, dt, reference)};
+    for (const auto status : laws) REQUIRE(status == auvest::Status::kOk);
+    now.heading_rad = heading.heading_rad();
+    now.speed_m_s = speed;
+    now.depth_m = Scalar(5.1);
+    REQUIRE(autopilot.update(wanted, speed, Scalar(5), now, dt, out) == auvest::Status::kOk);
+    REQUIRE(sliding.update(reference, now.heading_rad, now.yaw_rate_rad_s, speed, dt, rudder) ==
+            auvest::Status::kOk);
+    REQUIRE(pose.update(rest, pose_now, rest, rest, k % 2 == 0, dt, tau) == auvest::Status::kOk);
+    now.yaw_rate_rad_s =
+        now.yaw_rate_rad_s + dt * (Scalar(0.6) * out.rudder_rad - now.yaw_rate_rad_s);
+    REQUIRE(heading.predict(now.yaw_rate_rad_s, dt) == auvest::Status::kOk);
+    REQUIRE(heading.update(heading.heading_rad()) == auvest::Status::kOk);
+    if (k % 50 != 0) continue;
+    for (const Scalar number :
+         {filter.x()(0), filter.x()(1), out.rudder_rad, out.propeller_rev_s, out.stern_planes_rad,
+          rudder, pitch, tau(4), adaptive.crab_rad(), integral.integral()}) {
+      numbers.push_back(double(number));
+    }
+  }
+  CHECK(path.finished());
+  return numbers;
+}
+
+TEST_CASE("explicit scalar: guidance and control too") {
+  CHECK(run_guidance<ExplicitDouble>() == run_guidance<double>());
+}
+
 }  // namespace

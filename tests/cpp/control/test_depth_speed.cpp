@@ -6,7 +6,6 @@
 #include <limits>
 
 #include "auvest/control/depth_control.hpp"
-#include "auvest/control/integrator.hpp"
 #include "auvest/control/pitch_control.hpp"
 #include "auvest/control/speed_control.hpp"
 
@@ -21,19 +20,25 @@ double epsilon(double roundings) {
   return roundings * double(std::numeric_limits<Scalar>::epsilon());
 }
 
-TEST_CASE_TEMPLATE("integrator: adds, and at a limit only what leads away from it", Scalar, float,
-                   double) {
-  auvest::Integrator<Scalar> integral;
-  integral.add(2, Scalar(0.5), 0);
-  CHECK(integral.value() == Scalar(1));
-  integral.add(2, Scalar(0.5), Scalar(0.1));  // the command is cut from above
-  CHECK(integral.value() == Scalar(1));
-  integral.add(-2, Scalar(0.5), Scalar(0.1));
-  CHECK(integral.value() == Scalar(0));
-  integral.add(-2, Scalar(0.5), Scalar(-0.1));  // from below
-  CHECK(integral.value() == Scalar(0));
-  integral.add(2, Scalar(0.5), Scalar(-0.1));
-  CHECK(integral.value() == Scalar(1));
+TEST_CASE_TEMPLATE("integral: at either limit it takes only what leads away from there", Scalar,
+                   float, double) {
+  auvest::SpeedControl<Scalar> speed;  // a positive error raises the command
+  Scalar out = 0;
+  const auto integral_after = [&](double start, double wanted, double measured) {
+    REQUIRE(speed.restart(Scalar(start)) == Status::kOk);
+    REQUIRE(speed.update(Scalar(wanted), Scalar(measured), Scalar(0.5), out) == Status::kOk);
+    return double(speed.integral());
+  };
+  CHECK(integral_after(1, 1.5, 1) == 1.25);  // within
+  CHECK(!speed.saturated());
+  CHECK(integral_after(30, 1.5, 1) == 30);  // above, and the error asks for more
+  CHECK(speed.saturated());
+  CHECK(integral_after(30, 1.5, 2) == 29.75);  // above, and it asks for less
+  CHECK(speed.saturated());
+  CHECK(integral_after(-30, 1.5, 2) == -30);
+  CHECK(speed.saturated());
+  CHECK(integral_after(-30, 1.5, 1) == -29.75);
+  CHECK(speed.saturated());
 }
 
 TEST_CASE_TEMPLATE("speed, depth and pitch: their laws, step by step", Scalar, float, double) {
@@ -45,8 +50,7 @@ TEST_CASE_TEMPLATE("speed, depth and pitch: their laws, step by step", Scalar, f
   for (int k = 0; k < 10; ++k) {
     const double u = 1.4 + 0.02 * k, z = 5.2 - 0.03 * k, t = 0.01 * k - 0.05, q = 0.02 - 0.001 * k;
     REQUIRE(speed.update(Scalar(1.5), Scalar(u), Scalar(0.1), rev) == Status::kOk);
-    CHECK(std::fabs(double(rev) - (1.5 / 0.1 + 5 * (1.5 - u) + speed_sum)) <
-          epsilon<Scalar>(64));
+    CHECK(std::fabs(double(rev) - (1.5 / 0.1 + 5 * (1.5 - u) + speed_sum)) < epsilon<Scalar>(64));
     speed_sum += 0.1 * (1.5 - u);
     REQUIRE(depth.update(5, Scalar(z), Scalar(0.1), theta) == Status::kOk);
     CHECK(std::fabs(double(theta) - (0.1 * (z - 5) + 0.005 * depth_sum)) < epsilon<Scalar>(8));

@@ -94,24 +94,27 @@ class Autopilot {
   /// depth [m]. On anything but kOk nothing has changed, the command neither.
   Status update(const GuidanceCommand<Scalar>& wanted, Scalar speed_m_s, Scalar depth_m,
                 const AutopilotReadings<Scalar>& now, Scalar dt, TorpedoCommand<Scalar>& command) {
-    Autopilot next = *this;
-    TorpedoCommand<Scalar> out;
-    Reference<Scalar> heading;
-    Scalar pitch = Scalar(0);
-    Status status = next.reference_.update(wanted, dt, heading);
-    if (status != Status::kOk) return status;
-    status = next.heading_.update(heading, now.heading_rad, now.yaw_rate_rad_s, now.speed_m_s, dt,
-                                  out.rudder_rad);
-    if (status != Status::kOk) return status;
-    status = next.speed_.update(speed_m_s, now.speed_m_s, dt, out.propeller_rev_s);
-    if (status != Status::kOk) return status;
-    status = next.depth_.update(depth_m, now.depth_m, dt, pitch);
+    Reference<Scalar> reference;
+    ControlStep<Scalar> rudder, propeller, pitch, planes;
+    Status status = reference_.propose(wanted, dt, reference);
     if (status != Status::kOk) return status;
     status =
-        next.pitch_.update(pitch, now.pitch_rad, now.pitch_rate_rad_s, dt, out.stern_planes_rad);
+        heading_.propose(reference, now.heading_rad, now.yaw_rate_rad_s, now.speed_m_s, dt, rudder);
     if (status != Status::kOk) return status;
-    *this = next;
-    command = out;
+    status = speed_.propose(speed_m_s, now.speed_m_s, dt, propeller);
+    if (status != Status::kOk) return status;
+    status = depth_.propose(depth_m, now.depth_m, dt, pitch);
+    if (status != Status::kOk) return status;
+    status = pitch_.propose(pitch.command, now.pitch_rad, now.pitch_rate_rad_s, dt, planes);
+    if (status != Status::kOk) return status;
+    reference_.accept(reference);
+    heading_.accept(rudder);
+    speed_.accept(propeller);
+    depth_.accept(pitch);
+    pitch_.accept(planes);
+    command.rudder_rad = rudder.command;
+    command.stern_planes_rad = planes.command;
+    command.propeller_rev_s = propeller.command;
     return Status::kOk;
   }
 

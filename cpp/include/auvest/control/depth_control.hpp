@@ -5,16 +5,18 @@
 // z down: deeper than wanted gives nose up. PitchControl flies theta_d.
 #pragma once
 
-#include "auvest/control/integrator.hpp"
+#include "auvest/control/integrating_control.hpp"
 #include "auvest/math/basic.hpp"
 #include "auvest/status.hpp"
 
 namespace auvest {
 
 template <class Scalar_>
-class DepthControl {
+class DepthControl : public IntegratingControl<Scalar_> {
  public:
   using Scalar = Scalar_;
+  using Base = IntegratingControl<Scalar>;
+  using typename Base::Step;
 
   struct Params {
     Scalar proportional = Scalar(0.1);                  ///< Kp [rad/m], >= 0
@@ -30,42 +32,33 @@ class DepthControl {
     }
   };
 
-  explicit DepthControl(const Params& params = Params())
-      : params_(params),
-        check_(valid(params) ? Status::kOk : Status::kBadParameter),
-        saturated_(false) {}
-
-  /// kBadParameter if a parameter is out of range: everything else then refuses, too.
-  Status check() const { return check_; }
+  explicit DepthControl(const Params& params = Params()) : Base(valid(params)), params_(params) {}
 
   /// The pitch [rad] for the wanted depth from the measured one [m, down]. On anything but kOk
   /// nothing has changed, the pitch neither.
   Status update(Scalar wanted_m, Scalar depth_m, Scalar dt, Scalar& pitch_rad) {
-    if (check_ != Status::kOk) return check_;
+    Step step;
+    const Status status = propose(wanted_m, depth_m, dt, step);
+    if (status != Status::kOk) return status;
+    this->accept(step);
+    pitch_rad = step.command;
+    return Status::kOk;
+  }
+
+  /// The same step without taking it: accept(step) does.
+  Status propose(Scalar wanted_m, Scalar depth_m, Scalar dt, Step& step) const {
+    if (this->check() != Status::kOk) return this->check();
     if (!math::is_finite(wanted_m) || !math::is_finite(depth_m) || !math::is_finite(dt)) {
       return Status::kNotFinite;
     }
     if (dt < Scalar(0)) return Status::kTimeBackwards;
     const Scalar error = depth_m - wanted_m;
     // [CONTROL 9]
-    const Scalar wished = params_.proportional * error + params_.integral * integral_.value();
-    if (!math::is_finite(wished)) return Status::kOverflow;
-    pitch_rad = math::clamp(wished, -params_.max_pitch_rad, params_.max_pitch_rad);
-    const Scalar excess = wished - pitch_rad;
-    saturated_ = excess < Scalar(0) || excess > Scalar(0);
-    integral_.add(error, dt, excess);
-    return Status::kOk;
+    const Scalar wished = params_.proportional * error + params_.integral * this->integral();
+    return this->limit(wished, -params_.max_pitch_rad, params_.max_pitch_rad, error, true, dt,
+                       step);
   }
 
-  bool saturated() const { return saturated_; }          ///< in the last update
-  Scalar integral() const { return integral_.value(); }  ///< int (z - z_d) [m s]
-  /// Goes on with this integral; what is not a number is refused.
-  Status restart(Scalar integral = Scalar(0)) {
-    if (!math::is_finite(integral)) return Status::kNotFinite;
-    integral_.restart(integral);
-    saturated_ = false;
-    return Status::kOk;
-  }
   const Params& params() const { return params_; }
 
  private:
@@ -75,9 +68,6 @@ class DepthControl {
   }
 
   Params params_;
-  Status check_;
-  Integrator<Scalar> integral_;
-  bool saturated_;
 };
 
 }  // namespace auvest

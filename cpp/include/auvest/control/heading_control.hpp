@@ -15,7 +15,7 @@
 //     control.update(reference, heading, yaw_rate, 1.5f, 0.1f, rudder);
 #pragma once
 
-#include "auvest/control/integrator.hpp"
+#include "auvest/control/integrating_control.hpp"
 #include "auvest/control/reference.hpp"
 #include "auvest/control/steering.hpp"
 #include "auvest/math/angle.hpp"
@@ -25,9 +25,11 @@
 namespace auvest {
 
 template <class Scalar_>
-class HeadingControl {
+class HeadingControl : public IntegratingControl<Scalar_> {
  public:
   using Scalar = Scalar_;
+  using Base = IntegratingControl<Scalar>;
+  using typename Base::Step;
 
   struct Params : Steering<Scalar> {
     Scalar frequency_rad_s = Scalar(0.8);  ///< w, > 0
@@ -44,24 +46,29 @@ class HeadingControl {
     }
   };
 
-  explicit HeadingControl(const Params& params = Params())
-      : params_(params),
-        check_(valid(params) ? Status::kOk : Status::kBadParameter),
-        saturated_(false) {
+  explicit HeadingControl(const Params& params = Params()) : Base(valid(params)), params_(params) {
     const Scalar w = params.frequency_rad_s;
     rate_gain_ = Scalar(2) * params.damping * w;
     error_gain_ = w * w;
     integral_gain_ = Scalar(0.1) * (w * w * w);
   }
 
-  /// kBadParameter if a parameter is out of range: everything else then refuses, too.
-  Status check() const { return check_; }
-
   /// The rudder [rad], positive for a positive yaw rate, from heading [rad], yaw rate [rad/s] and
   /// speed through the water [m/s]. On anything but kOk nothing has changed, the rudder neither.
   Status update(const Reference<Scalar>& wanted, Scalar heading_rad, Scalar rate_rad_s,
                 Scalar speed_m_s, Scalar dt, Scalar& rudder_rad) {
-    if (check_ != Status::kOk) return check_;
+    Step step;
+    const Status status = propose(wanted, heading_rad, rate_rad_s, speed_m_s, dt, step);
+    if (status != Status::kOk) return status;
+    this->accept(step);
+    rudder_rad = step.command;
+    return Status::kOk;
+  }
+
+  /// The same step without taking it: accept(step) does.
+  Status propose(const Reference<Scalar>& wanted, Scalar heading_rad, Scalar rate_rad_s,
+                 Scalar speed_m_s, Scalar dt, Step& step) const {
+    if (this->check() != Status::kOk) return this->check();
     if (!math::is_finite(wanted.value) || !math::is_finite(wanted.rate) ||
         !math::is_finite(wanted.acceleration) || !math::is_finite(heading_rad) ||
         !math::is_finite(rate_rad_s) || !math::is_finite(speed_m_s) || !math::is_finite(dt)) {
@@ -71,28 +78,15 @@ class HeadingControl {
     const Scalar error = math::wrap(heading_rad - wanted.value);
     const Scalar slip = rate_rad_s - wanted.rate;
     const Scalar acceleration = wanted.acceleration - rate_gain_ * slip - error_gain_ * error -
-                                integral_gain_ * integral_.value();
+                                integral_gain_ * this->integral();
     const Scalar rate = wanted.rate + params_.share * slip;
     // [CONTROL 5]
     const Scalar wished =
         (params_.time_constant_s * acceleration + rate) / params_.gain_at(speed_m_s);
-    if (!math::is_finite(wished)) return Status::kOverflow;
-    rudder_rad = math::clamp(wished, -params_.max_rudder_rad, params_.max_rudder_rad);
-    const Scalar excess = rudder_rad - wished;  // a positive error lowers the rudder
-    saturated_ = excess < Scalar(0) || excess > Scalar(0);
-    integral_.add(error, dt, excess);
-    return Status::kOk;
+    return this->limit(wished, -params_.max_rudder_rad, params_.max_rudder_rad, error, false, dt,
+                       step);
   }
 
-  bool saturated() const { return saturated_; }          ///< in the last update
-  Scalar integral() const { return integral_.value(); }  ///< int e [rad s]
-  /// Goes on with this integral; what is not a number is refused.
-  Status restart(Scalar integral = Scalar(0)) {
-    if (!math::is_finite(integral)) return Status::kNotFinite;
-    integral_.restart(integral);
-    saturated_ = false;
-    return Status::kOk;
-  }
   const Params& params() const { return params_; }
 
  private:
@@ -102,10 +96,7 @@ class HeadingControl {
   }
 
   Params params_;
-  Status check_;
   Scalar rate_gain_, error_gain_, integral_gain_;
-  Integrator<Scalar> integral_;
-  bool saturated_;
 };
 
 }  // namespace auvest

@@ -50,18 +50,28 @@ class HeadingReference {
 
   /// The reference dt seconds on. On anything but kOk nothing has changed.
   Status update(const GuidanceCommand<Scalar>& wanted, Scalar dt, Reference<Scalar>& reference) {
+    const Status status = propose(wanted, dt, reference);
+    if (status == Status::kOk) accept(reference);
+    return status;
+  }
+
+  /// The same without going there: accept(reference) does.
+  Status propose(const GuidanceCommand<Scalar>& wanted, Scalar dt,
+                 Reference<Scalar>& reference) const {
     if (check_ != Status::kOk) return check_;
     if (!math::is_finite(wanted.heading_rad) || !math::is_finite(wanted.rate_rad_s) ||
         !math::is_finite(dt)) {
       return Status::kNotFinite;
     }
     if (dt < Scalar(0)) return Status::kTimeBackwards;
-    heading_ = math::wrap(heading_ + dt * rate(wanted));
-    reference.value = heading_;
-    reference.rate = rate(wanted);
+    const Scalar heading = math::wrap(heading_ + dt * rate(wanted, heading_));
+    if (!math::is_finite(heading)) return Status::kOverflow;
+    reference.value = heading;
+    reference.rate = rate(wanted, heading);
     reference.acceleration = Scalar(0);  // jumps with r_d: of no use to a rudder
     return Status::kOk;
   }
+  void accept(const Reference<Scalar>& reference) { heading_ = reference.value; }
 
   Scalar heading_rad() const { return heading_; }  ///< psi_d
   const Params& params() const { return params_; }
@@ -71,8 +81,8 @@ class HeadingReference {
     return math::is_positive(p.gain) && math::is_positive(p.max_rate_rad_s);
   }
 
-  Scalar rate(const GuidanceCommand<Scalar>& wanted) const {
-    const Scalar error = math::wrap(wanted.heading_rad - heading_);
+  Scalar rate(const GuidanceCommand<Scalar>& wanted, Scalar from) const {
+    const Scalar error = math::wrap(wanted.heading_rad - from);
     const Scalar most = params_.max_rate_rad_s;
     return math::clamp(wanted.rate_rad_s + params_.gain * error, -most, most);  // [CONTROL 2]
   }

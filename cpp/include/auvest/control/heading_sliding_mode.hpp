@@ -11,7 +11,7 @@
 //     (T s + 1 + K_d + K_s / phi_b) (s + l)^2.
 #pragma once
 
-#include "auvest/control/integrator.hpp"
+#include "auvest/control/integrating_control.hpp"
 #include "auvest/control/reference.hpp"
 #include "auvest/control/steering.hpp"
 #include "auvest/math/angle.hpp"
@@ -21,9 +21,11 @@
 namespace auvest {
 
 template <class Scalar_>
-class HeadingSlidingMode {
+class HeadingSlidingMode : public IntegratingControl<Scalar_> {
  public:
   using Scalar = Scalar_;
+  using Base = IntegratingControl<Scalar>;
+  using typename Base::Step;
 
   struct Params : Steering<Scalar> {
     Scalar bandwidth_rad_s = Scalar(0.3);   ///< l, > 0
@@ -43,17 +45,23 @@ class HeadingSlidingMode {
   };
 
   explicit HeadingSlidingMode(const Params& params = Params())
-      : params_(params),
-        check_(valid(params) ? Status::kOk : Status::kBadParameter),
-        saturated_(false) {}
-
-  /// kBadParameter if a parameter is out of range: everything else then refuses, too.
-  Status check() const { return check_; }
+      : Base(valid(params)), params_(params) {}
 
   /// As HeadingControl::update.
   Status update(const Reference<Scalar>& wanted, Scalar heading_rad, Scalar rate_rad_s,
                 Scalar speed_m_s, Scalar dt, Scalar& rudder_rad) {
-    if (check_ != Status::kOk) return check_;
+    Step step;
+    const Status status = propose(wanted, heading_rad, rate_rad_s, speed_m_s, dt, step);
+    if (status != Status::kOk) return status;
+    this->accept(step);
+    rudder_rad = step.command;
+    return Status::kOk;
+  }
+
+  /// The same step without taking it: accept(step) does.
+  Status propose(const Reference<Scalar>& wanted, Scalar heading_rad, Scalar rate_rad_s,
+                 Scalar speed_m_s, Scalar dt, Step& step) const {
+    if (this->check() != Status::kOk) return this->check();
     if (!math::is_finite(wanted.value) || !math::is_finite(wanted.rate) ||
         !math::is_finite(wanted.acceleration) || !math::is_finite(heading_rad) ||
         !math::is_finite(rate_rad_s) || !math::is_finite(speed_m_s) || !math::is_finite(dt)) {
@@ -64,7 +72,7 @@ class HeadingSlidingMode {
     const Scalar l = params_.bandwidth_rad_s;
     const Scalar error = math::wrap(heading_rad - wanted.value);
     const Scalar slip = rate_rad_s - wanted.rate;
-    const Scalar pull = Scalar(2) * l * error + l * l * integral_.value();
+    const Scalar pull = Scalar(2) * l * error + l * l * this->integral();
     const Scalar surface = slip + pull;  // [CONTROL 6]
     const Scalar rate = wanted.rate - pull;
     const Scalar acceleration = wanted.acceleration - Scalar(2) * l * slip - l * l * error;
@@ -73,23 +81,10 @@ class HeadingSlidingMode {
     const Scalar wished = (params_.time_constant_s * acceleration + rate -
                            params_.damping * surface - params_.switching_rad_s * layer) /
                           params_.gain_at(speed_m_s);
-    if (!math::is_finite(wished)) return Status::kOverflow;
-    rudder_rad = math::clamp(wished, -params_.max_rudder_rad, params_.max_rudder_rad);
-    const Scalar excess = rudder_rad - wished;  // a positive error lowers the rudder
-    saturated_ = excess < Scalar(0) || excess > Scalar(0);
-    integral_.add(error, dt, excess);
-    return Status::kOk;
+    return this->limit(wished, -params_.max_rudder_rad, params_.max_rudder_rad, error, false, dt,
+                       step);
   }
 
-  bool saturated() const { return saturated_; }          ///< in the last update
-  Scalar integral() const { return integral_.value(); }  ///< int e [rad s]
-  /// Goes on with this integral; what is not a number is refused.
-  Status restart(Scalar integral = Scalar(0)) {
-    if (!math::is_finite(integral)) return Status::kNotFinite;
-    integral_.restart(integral);
-    saturated_ = false;
-    return Status::kOk;
-  }
   const Params& params() const { return params_; }
 
  private:
@@ -99,9 +94,6 @@ class HeadingSlidingMode {
   }
 
   Params params_;
-  Status check_;
-  Integrator<Scalar> integral_;
-  bool saturated_;
 };
 
 }  // namespace auvest

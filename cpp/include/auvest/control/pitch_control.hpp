@@ -5,7 +5,7 @@
 // a positive stern plane turns the nose down. The derivative acts on the pitch rate.
 #pragma once
 
-#include "auvest/control/integrator.hpp"
+#include "auvest/control/integrating_control.hpp"
 #include "auvest/math/angle.hpp"
 #include "auvest/math/basic.hpp"
 #include "auvest/status.hpp"
@@ -13,9 +13,11 @@
 namespace auvest {
 
 template <class Scalar_>
-class PitchControl {
+class PitchControl : public IntegratingControl<Scalar_> {
  public:
   using Scalar = Scalar_;
+  using Base = IntegratingControl<Scalar>;
+  using typename Base::Step;
 
   struct Params {
     Scalar proportional = Scalar(1.5);                  ///< Kp, >= 0
@@ -33,19 +35,24 @@ class PitchControl {
     }
   };
 
-  explicit PitchControl(const Params& params = Params())
-      : params_(params),
-        check_(valid(params) ? Status::kOk : Status::kBadParameter),
-        saturated_(false) {}
-
-  /// kBadParameter if a parameter is out of range: everything else then refuses, too.
-  Status check() const { return check_; }
+  explicit PitchControl(const Params& params = Params()) : Base(valid(params)), params_(params) {}
 
   /// The stern plane [rad] for the wanted pitch, from pitch [rad] and pitch rate [rad/s]. On
   /// anything but kOk nothing has changed, the plane neither.
   Status update(Scalar wanted_rad, Scalar pitch_rad, Scalar rate_rad_s, Scalar dt,
                 Scalar& plane_rad) {
-    if (check_ != Status::kOk) return check_;
+    Step step;
+    const Status status = propose(wanted_rad, pitch_rad, rate_rad_s, dt, step);
+    if (status != Status::kOk) return status;
+    this->accept(step);
+    plane_rad = step.command;
+    return Status::kOk;
+  }
+
+  /// The same step without taking it: accept(step) does.
+  Status propose(Scalar wanted_rad, Scalar pitch_rad, Scalar rate_rad_s, Scalar dt,
+                 Step& step) const {
+    if (this->check() != Status::kOk) return this->check();
     if (!math::is_finite(wanted_rad) || !math::is_finite(pitch_rad) ||
         !math::is_finite(rate_rad_s) || !math::is_finite(dt)) {
       return Status::kNotFinite;
@@ -54,24 +61,11 @@ class PitchControl {
     const Scalar error = math::wrap(pitch_rad - wanted_rad);
     // [CONTROL 10]
     const Scalar wished = params_.proportional * error + params_.derivative * rate_rad_s +
-                          params_.integral * integral_.value();
-    if (!math::is_finite(wished)) return Status::kOverflow;
-    plane_rad = math::clamp(wished, -params_.max_plane_rad, params_.max_plane_rad);
-    const Scalar excess = wished - plane_rad;
-    saturated_ = excess < Scalar(0) || excess > Scalar(0);
-    integral_.add(error, dt, excess);
-    return Status::kOk;
+                          params_.integral * this->integral();
+    return this->limit(wished, -params_.max_plane_rad, params_.max_plane_rad, error, true, dt,
+                       step);
   }
 
-  bool saturated() const { return saturated_; }          ///< in the last update
-  Scalar integral() const { return integral_.value(); }  ///< int (theta - theta_d) [rad s]
-  /// Goes on with this integral; what is not a number is refused.
-  Status restart(Scalar integral = Scalar(0)) {
-    if (!math::is_finite(integral)) return Status::kNotFinite;
-    integral_.restart(integral);
-    saturated_ = false;
-    return Status::kOk;
-  }
   const Params& params() const { return params_; }
 
  private:
@@ -81,9 +75,6 @@ class PitchControl {
   }
 
   Params params_;
-  Status check_;
-  Integrator<Scalar> integral_;
-  bool saturated_;
 };
 
 }  // namespace auvest

@@ -57,7 +57,7 @@ class PoseControl {
   /// Force and moment [N, N m] in the body's axes. `restoring` is g(eta), zero if it is not known;
   /// `saturated` whether the thrusters could not give the last tau: an error then takes from its
   /// integral but adds nothing. Refused, with nothing changed: what is not a number (kNotFinite),
-  /// and a pitch beyond 80 degrees, where T is nearly singular (kBadParameter).
+  /// and a pitch beyond 80 degrees, where T is nearly singular (kSteepPitch).
   Status update(const Vector6& wanted, const Vector6& pose, const Vector6& velocity,
                 const Vector6& restoring, bool saturated, Scalar dt, Vector6& tau) {
     if (check_ != Status::kOk) return check_;
@@ -67,7 +67,7 @@ class PoseControl {
     }
     if (dt < Scalar(0)) return Status::kTimeBackwards;
     if (math::absolute(math::wrap(pose(4))) > Scalar(1.3962634015954636))
-      return Status::kBadParameter;
+      return Status::kSteepPitch;
     Vector6 error;
     Vector6 pull;  // Kp e + Ki int e
     for (int i = 0; i < 6; ++i) {

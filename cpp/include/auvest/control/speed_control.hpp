@@ -5,16 +5,18 @@
 // c the advance per revolution where thrust equals drag.
 #pragma once
 
-#include "auvest/control/integrator.hpp"
+#include "auvest/control/integrating_control.hpp"
 #include "auvest/math/basic.hpp"
 #include "auvest/status.hpp"
 
 namespace auvest {
 
 template <class Scalar_>
-class SpeedControl {
+class SpeedControl : public IntegratingControl<Scalar_> {
  public:
   using Scalar = Scalar_;
+  using Base = IntegratingControl<Scalar>;
+  using typename Base::Step;
 
   struct Params {
     /// c [m/rev], > 0; of the torpedo `remus100`, 0.09994 rounded: the integral takes the rest
@@ -33,18 +35,22 @@ class SpeedControl {
     }
   };
 
-  explicit SpeedControl(const Params& params = Params())
-      : params_(params),
-        check_(valid(params) ? Status::kOk : Status::kBadParameter),
-        saturated_(false) {}
-
-  /// kBadParameter if a parameter is out of range: everything else then refuses, too.
-  Status check() const { return check_; }
+  explicit SpeedControl(const Params& params = Params()) : Base(valid(params)), params_(params) {}
 
   /// Revolutions per second for the wanted speed from the measured one, both through the water
   /// [m/s]. On anything but kOk nothing has changed, the command neither.
   Status update(Scalar wanted_m_s, Scalar speed_m_s, Scalar dt, Scalar& rev_s) {
-    if (check_ != Status::kOk) return check_;
+    Step step;
+    const Status status = propose(wanted_m_s, speed_m_s, dt, step);
+    if (status != Status::kOk) return status;
+    this->accept(step);
+    rev_s = step.command;
+    return Status::kOk;
+  }
+
+  /// The same step without taking it: accept(step) does.
+  Status propose(Scalar wanted_m_s, Scalar speed_m_s, Scalar dt, Step& step) const {
+    if (this->check() != Status::kOk) return this->check();
     if (!math::is_finite(wanted_m_s) || !math::is_finite(speed_m_s) || !math::is_finite(dt)) {
       return Status::kNotFinite;
     }
@@ -52,24 +58,10 @@ class SpeedControl {
     const Scalar error = wanted_m_s - speed_m_s;
     // [CONTROL 8]
     const Scalar wished = wanted_m_s / params_.advance_m + params_.proportional * error +
-                          params_.integral * integral_.value();
-    if (!math::is_finite(wished)) return Status::kOverflow;
-    rev_s = math::clamp(wished, Scalar(0), params_.max_rev_s);
-    const Scalar excess = wished - rev_s;
-    saturated_ = excess < Scalar(0) || excess > Scalar(0);
-    integral_.add(error, dt, excess);
-    return Status::kOk;
+                          params_.integral * this->integral();
+    return this->limit(wished, Scalar(0), params_.max_rev_s, error, true, dt, step);
   }
 
-  bool saturated() const { return saturated_; }          ///< in the last update
-  Scalar integral() const { return integral_.value(); }  ///< int (U - u) [m]
-  /// Goes on with this integral; what is not a number is refused.
-  Status restart(Scalar integral = Scalar(0)) {
-    if (!math::is_finite(integral)) return Status::kNotFinite;
-    integral_.restart(integral);
-    saturated_ = false;
-    return Status::kOk;
-  }
   const Params& params() const { return params_; }
 
  private:
@@ -79,9 +71,6 @@ class SpeedControl {
   }
 
   Params params_;
-  Status check_;
-  Integrator<Scalar> integral_;
-  bool saturated_;
 };
 
 }  // namespace auvest

@@ -234,8 +234,8 @@ class Waypoints {
 
   bool due(const PathPoint<Scalar>& point) const {
     if (where_ == Where::kEnd) return false;
-    const Scalar lead = where_ == Where::kArc ? Scalar(0) : lead_;
-    return length() - point.along_m < lead || !(length() - point.along_m > Scalar(0));  // [GUIDE 3]
+    const Scalar remaining = length() - point.along_m;
+    return !(remaining > Scalar(0)) || (where_ == Where::kLeg && remaining < lead_);  // [GUIDE 3]
   }
 
   void begin_leg(std::uint16_t leg) {
@@ -264,8 +264,8 @@ class Waypoints {
       }
       return;
     }
-    const bool round = where_ == Where::kLeg && turn_ != Scalar(0);
-    if (round &&
+    const bool rounded = where_ == Where::kLeg && turn_ != Scalar(0);
+    if (rounded &&
         arc_.leave(corner.x_m - lead_ * line_.cosine(), corner.y_m - lead_ * line_.sine(),
                    line_.sine(), line_.cosine(), turn_ < Scalar(0) ? -params_.arc_m : params_.arc_m,
                    turn_ < Scalar(0) ? -turn_ : turn_) == Status::kOk) {
