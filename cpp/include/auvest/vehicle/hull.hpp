@@ -14,7 +14,9 @@
 // A vehicle says what acts on the hull (torpedo.hpp, rov.hpp; your own is one struct). It offers
 //
 //     Scalar, Params                  Params: HullParams and the vehicle's own
-//     kActuators, kNeedsSpeed         kNeedsSpeed: whether a load reads the speed of the flow
+//     kActuators
+//     kNeedsSpeed                     whether a load reads the speed of the flow
+//     kAddedCoriolis                  whether C_A is left to the hull; false: a load has it
 //     demands(command, demand)        saturation and curves of the command, once per step
 //     actuator_rates(state, demand, rate)
 //     limit_actuators(state)          after a step
@@ -71,11 +73,12 @@ class Hull {
 
   explicit Hull(const Params& p)
       : vehicle_(p), added_(p.added_mass), restoring_(p.restoring, p.body) {
+    const bool all = Vehicle::kAddedCoriolis && p.added_mass.munk;
     math::set_zero(mass_);
     RigidBody<Scalar>(p.body).add_to(mass_);
-    if (!p.added_mass.munk) keep_for_coriolis();
+    if (!all) keep_for_coriolis();
     added_.add_to(mass_);
-    if (p.added_mass.munk) keep_for_coriolis();
+    if (all) keep_for_coriolis();
     invert();
   }
 
@@ -184,7 +187,7 @@ class Hull {
     math::set_zero(tau, 6);
     vehicle_.add_loads(tau, flow, actuators, Freedom());  // [AUKF 1]
     subtract_coriolis(coriolis_, flow.nu, tau, Freedom());
-    if (!vehicle_.params.added_mass.munk) {
+    if (Vehicle::kAddedCoriolis && !vehicle_.params.added_mass.munk) {
       added_.subtract_reduced_coriolis(flow.nu, tau, Freedom());
     }
     restoring_.subtract_from(tau, a, Freedom());

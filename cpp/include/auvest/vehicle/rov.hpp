@@ -17,6 +17,7 @@ struct Rov {
   using Scalar = Scalar_;
   static constexpr int kActuators = Count;
   static constexpr bool kNeedsSpeed = false;
+  static constexpr bool kAddedCoriolis = true;
 
   struct Params : HullParams<Scalar> {
     typename LinearDamping<Scalar, false>::Params linear_damping;

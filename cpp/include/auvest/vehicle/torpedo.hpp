@@ -28,6 +28,7 @@ struct Torpedo {
   using Scalar = Scalar_;
   static constexpr int kActuators = 3;
   static constexpr bool kNeedsSpeed = true;
+  static constexpr bool kAddedCoriolis = true;
 
   struct Params : HullParams<Scalar> {
     Scalar density_kg_m3 = Scalar(0);  ///< rho of the water
