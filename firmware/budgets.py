@@ -481,7 +481,41 @@ def page(rows: list[Row]) -> str:
         verdict = "met" if figure.met else "**not met**"
         lines.append(f"| {figure.name} | {figure.limit:,} | {measured} | {verdict} |")
     lines += slatf_page(rows)
+    lines += vehicle_page(rows)
     return "\n".join([*lines, ""])
+
+
+#: What the vehicle's own part of a period is made of; cycles that were asked for, in the median.
+PERIOD_S = 0.1
+PERIOD_PARTS = ("heading_filter", "model_aided_predict", "guidance_control")
+MAX_GUIDANCE_CONTROL = 20_000
+
+
+def vehicle_page(rows: list[Row]) -> list[str]:
+    """Return the lines of the page on the vehicle: a period of a mission."""
+    cycles = {row.program: row.cycles_median or 0 for row in rows}
+    control = cycles["guidance_control"]
+    plain = sum(cycles[name] for name in PERIOD_PARTS)
+    fixed = plain + cycles["model_aided_update"]
+    period = 16e6 * PERIOD_S
+    return [
+        "",
+        "## What a vehicle takes",
+        "",
+        "Ten times a second: `heading_filter`, `model_aided_predict` (EKF of dead reckoning with the",
+        "current in its state, IGG and the recovery), `model_aided_update` where there is a fix, and",
+        "`guidance_control`: two legs of a plan and the arc between them, crab feed-forward, and the",
+        "autopilot of heading, speed, depth and pitch. The four are one program of which a part is",
+        "counted; the largest step of `guidance_control` is the one that switches from an arc to a",
+        "leg. `hull3` is the torpedo in the plane, `hull6` in six degrees of freedom, one checked",
+        "step; `rov_allocation` gives a demand to eight thrusters by priority, one of four out of",
+        "reach, and `rov_thrust_inverse` finds the eight inputs by Newton's method.",
+        "",
+        f"Guidance and control: {control:,} cycles in the median, {MAX_GUIDANCE_CONTROL:,} asked for"
+        f" ({'met' if control <= MAX_GUIDANCE_CONTROL else '**not met**'}). A period without a fix",
+        f"takes {plain:,} cycles, {plain / period:.1%} of it, and one with a fix {fixed:,}, "
+        f"{fixed / period:.1%}.",
+    ]
 
 
 def slatf_page(rows: list[Row]) -> list[str]:

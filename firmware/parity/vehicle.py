@@ -312,6 +312,22 @@ class RovRecord(Record):
 
 # ---- The records ---------------------------------------------------------------------------------
 
+#: Names of all records.
+NAMES = (
+    "mission",
+    "mission-circle",
+    "mission-adaptive",
+    "mission-line-of-sight",
+    "mission-integral",
+    "mission-vector-field",
+    "hull6",
+    "hull3",
+    "hull6-zigzag",
+    "hull6-semi-implicit",
+    "hull3-semi-implicit",
+    "rov",
+)
+
 def zigzag(steps: int, h: float) -> Rows:
     """Full rudder to either side, the nose up and down, the propeller ahead and astern."""
     t = h * np.arange(steps)
@@ -322,10 +338,10 @@ def zigzag(steps: int, h: float) -> Rows:
 
 
 def _stations() -> Rows:
-    """Every 40 s another place and heading; some so far that the thrusters are at their limits."""
+    """Every 15 s another place and heading; some so far that the thrusters are at their limits."""
     places = np.array([[0, 0, 0, 0], [1, -0.5, 0.5, 1.57], [6, 4, 3, -3.0], [6, 4, 3, 3.0]])
-    rows = np.zeros((1600, 6), "<f4")
-    rows[:, [0, 1, 2, 5]] = places[np.arange(len(rows)) // 400]
+    rows = np.zeros((600, 6), "<f4")
+    rows[:, [0, 1, 2, 5]] = places[np.arange(len(rows)) // 150]
     return rows
 
 
