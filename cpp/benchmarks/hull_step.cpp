@@ -102,8 +102,7 @@ int measure_lanes(int steps, int repeats) {
 #endif
   if (xsimd::available_architectures().AUVEST_SIMD_ARCH == 0) return kExitNoLanes;
   measure<float, Value, Value::kWidth>(
-      steps, repeats,
-      [](const float* from) { return Value(Value::Batch::load_unaligned(from)); },
+      steps, repeats, [](const float* from) { return Value(Value::Batch::load_unaligned(from)); },
       [](const Value& value, int lane) {
         float lanes[Value::kWidth];
         value.v.store_unaligned(lanes);

@@ -56,7 +56,9 @@ PAGE = """# Speed of a hull
 Made by `make bench`. One RK4 step of the torpedo `remus100` in six degrees of freedom: added mass,
 Coriolis, lift and drag, cross flow, fading linear damping, restoring, fins and propeller with their
 lags, a current; one thread. NumPy: the textbook's vectors and matrices, one hull. Numba: the same
-in scalars, every product of a zero left out, compiled for double and for float32. The lanes are
+in scalars, for double and for float32, its parameters compiled in; the mass matrix and its inverse
+come at run time, as they do here, or every product with a 0 of this hull is left out of the program
+("own zeros left out": another hull is another program, and that is not compared). The lanes are
 {runs} runs at once, one program per instruction set (cpp/benchmarks/hull_step.cpp, chosen when it is
 compiled), and have the bits of the scalar program in float. The times are the processor's, medians
 of rounds in which all take their turn; only the ratios travel to another machine.
@@ -185,8 +187,12 @@ def fly_numpy(x: Floats, command: Floats, current: Floats, h: float, steps: int)
     return x
 
 
-def compiled(kind: type) -> Fly:
-    """Compile the hull in scalars by Numba, for float32 or float64."""
+def compiled(kind: type, *, own_zeros: bool) -> Fly:
+    """Compile the hull in scalars by Numba, for float32 or float64.
+
+    With `own_zeros` every product of a coefficient that is 0 in this hull is left out of the
+    program; without, it takes the mass matrix and its inverse as they come, as auvest does.
+    """
     p = vehicle.parameters("remus100")
     body, added, damping = p["body"], p["added_mass"], p["linear_damping"]
     foil, flow, screw = p["lift_drag"], p["cross_flow"], p["propeller"]
@@ -200,6 +206,7 @@ def compiled(kind: type) -> Fly:
     M = np.diag([m + a[0], m + a[1], m + a[2], ix + a[3], iy + a[4], iz + a[5]])
     M[0, 4] = M[4, 0] = m * zg
     M[1, 3] = M[3, 1] = -m * zg
+    rigid = (M - np.diag(a)).astype(kind)
     inverse = np.linalg.inv(M)
     half_area = 0.5 * density * foil["area_m2"]
     drag_0 = half_area * foil["drag"]
@@ -250,7 +257,7 @@ def compiled(kind: type) -> Fly:
         return math.copysign(force, v), math.copysign(moment, r)
 
     @compile_it
-    def rate(x, demand, current, dx):  # type: ignore[no-untyped-def]
+    def rate(x, demand, current, dx, rigid, inverse, row):  # type: ignore[no-untyped-def]
         sf, cf = math.sin(x[3]), math.cos(x[3])
         st, ct = math.sin(x[4]), math.cos(x[4])
         sy, cy = math.sin(x[5]), math.cos(x[5])
@@ -291,32 +298,47 @@ def compiled(kind: type) -> Fly:
         M = slab * moment_2 - d4 * q + x_s * fin_2 - righting * st
         N = -slab * moment_1 - d5 * r - x_r * fin_1
         # The rigid body's momenta, and what is left of the added mass's.
-        P0 = mass * u + mzg * q
-        P1 = mass * v - mzg * p
-        P2 = mass * w
-        H0 = jx * p - mzg * v
-        H1 = jy * q + mzg * u
-        H2 = jz * r
+        if own_zeros:
+            P0 = mass * u + mzg * q
+            P1 = mass * v - mzg * p
+            P2 = mass * w
+            H0 = jx * p - mzg * v
+            H1 = jy * q + mzg * u
+            H2 = jz * r
+        else:
+            for i in range(6):
+                row[i] = zero
+                for j in range(6):
+                    row[i] += rigid[i, j] * x[6 + j]
+            P0, P1, P2, H0, H1, H2 = row[0], row[1], row[2], row[3], row[4], row[5]
         X += P1 * r - P2 * q
         Y += P2 * p - P0 * r + heave_added * w * p
         Z += P0 * q - P1 * p - sway_added * v * p
         K += P1 * w - P2 * v + H1 * r - H2 * q
         M += P2 * u - P0 * w + H2 * p - H0 * r - pitch_pair * p * r
         N += P0 * v - P1 * u + H0 * q - H1 * p - yaw_pair * p * q
-        dx[6] = i00 * X + i04 * M
-        dx[7] = i11 * Y + i13 * K
-        dx[8] = i22 * Z
-        dx[9] = i13 * Y + i33 * K
-        dx[10] = i04 * X + i44 * M
-        dx[11] = i55 * N
+        if own_zeros:
+            dx[6] = i00 * X + i04 * M
+            dx[7] = i11 * Y + i13 * K
+            dx[8] = i22 * Z
+            dx[9] = i13 * Y + i33 * K
+            dx[10] = i04 * X + i44 * M
+            dx[11] = i55 * N
+        else:
+            row[0], row[1], row[2], row[3], row[4], row[5] = X, Y, Z, K, M, N
+            for i in range(6):
+                dx[6 + i] = zero
+                for j in range(6):
+                    dx[6 + i] += inverse[i, j] * row[j]
         dx[12] = (demand[0] - x[12]) / lag_r
         dx[13] = (demand[1] - x[13]) / lag_s
         dx[14] = (demand[2] - x[14]) / lag_n
 
     @numba.njit(error_model="numpy")
-    def fly(x0, command, current, h, steps):  # type: ignore[no-untyped-def]
+    def fly(x0, command, current, h, steps, rigid, inverse):  # type: ignore[no-untyped-def]
         x = x0.copy()
         demand = np.empty(3, x.dtype)
+        row = np.empty(6, x.dtype)
         slope = np.empty(15, x.dtype)
         total = np.empty(15, x.dtype)
         stage = np.empty(15, x.dtype)
@@ -324,19 +346,19 @@ def compiled(kind: type) -> Fly:
         demand[1] = min(max(command[1], -top_s), top_s)
         demand[2] = min(max(command[2], -top_n), top_n)
         for _ in range(steps):
-            rate(x, demand, current, slope)
+            rate(x, demand, current, slope, rigid, inverse, row)
             for i in range(15):
                 total[i] = slope[i]
                 stage[i] = x[i] + half * h * slope[i]
-            rate(stage, demand, current, slope)
+            rate(stage, demand, current, slope, rigid, inverse, row)
             for i in range(15):
                 total[i] += two * slope[i]
                 stage[i] = x[i] + half * h * slope[i]
-            rate(stage, demand, current, slope)
+            rate(stage, demand, current, slope, rigid, inverse, row)
             for i in range(15):
                 total[i] += two * slope[i]
                 stage[i] = x[i] + h * slope[i]
-            rate(stage, demand, current, slope)
+            rate(stage, demand, current, slope, rigid, inverse, row)
             for i in range(15):
                 x[i] += h / six * (total[i] + slope[i])
             x[12] = min(max(x[12], -top_r), top_r)
@@ -346,7 +368,7 @@ def compiled(kind: type) -> Fly:
 
     def typed(x0: Floats, command: Floats, current: Floats, h: float, steps: int) -> Floats:
         arrays = (np.asarray(array, kind) for array in (x0, command, current))
-        result: Floats = fly(*arrays, kind(h), steps)
+        result: Floats = fly(*arrays, kind(h), steps, rigid, inverse.astype(kind))
         return result
 
     return typed
@@ -412,8 +434,10 @@ def main() -> int:
     lanes = [name for name in built if program(folder / name, "lanes", 1) is not None]
     peers: dict[str, Fly] = {
         "NumPy": fly_numpy,
-        "Numba, double": compiled(np.float64),
-        "Numba, float32": compiled(np.float32),
+        "Numba, double": compiled(np.float64, own_zeros=False),
+        "Numba, float32": compiled(np.float32, own_zeros=False),
+        "Numba, double, own zeros left out": compiled(np.float64, own_zeros=True),
+        "Numba, float32, own zeros left out": compiled(np.float32, own_zeros=True),
     }
     odd_one = agree(folder, lanes, peers)
     if odd_one is not None:
@@ -449,8 +473,14 @@ def main() -> int:
             target=TARGET_NUMBA,
         ),
         Check(
-            "auvest, float32 / its lanes", ratio("auvest, float32", widest), target=TARGET_LANES
+            "Numba, double, own zeros left out / auvest, double",
+            ratio("Numba, double, own zeros left out", "auvest, double"),
         ),
+        Check(
+            "Numba, float32, own zeros left out / lanes",
+            ratio("Numba, float32, own zeros left out", widest),
+        ),
+        Check("auvest, float32 / its lanes", ratio("auvest, float32", widest), target=TARGET_LANES),
     ]
     text = PAGE.format(
         runs=RUNS,

@@ -328,6 +328,7 @@ NAMES = (
     "rov",
 )
 
+
 def zigzag(steps: int, h: float) -> Rows:
     """Full rudder to either side, the nose up and down, the propeller ahead and astern."""
     t = h * np.arange(steps)

@@ -40,8 +40,8 @@ class Recorder {
 
  private:
   static void write(double value) {
-    const float number = auvest::math::is_nan(value) ? auvest::math::quiet_nan()
-                                                     : static_cast<float>(value);
+    const float number =
+        auvest::math::is_nan(value) ? auvest::math::quiet_nan() : static_cast<float>(value);
     const std::uint32_t word = auvest::math::to_bits(number);
     for (int i = 0; i < 4; ++i) std::putchar(static_cast<int>(word >> 8 * i & 0xff));
   }
@@ -53,9 +53,8 @@ class Recorder {
 
 int main(int argc, char** argv) {
   if (argc != 10) {
-    std::fputs(
-        "usage: vehicle_world TRACK LAW KERNEL REJECTIONS ARC SPEED SECONDS OUTLIERS SEED\n",
-        stderr);
+    std::fputs("usage: vehicle_world TRACK LAW KERNEL REJECTIONS ARC SPEED SECONDS OUTLIERS SEED\n",
+               stderr);
     return 2;
   }
   auvest::MissionScenario s;
@@ -74,8 +73,8 @@ int main(int argc, char** argv) {
   s.estimate = auvest::MissionEstimate::kModelAided;
   s.interval.fixed.params.interval_s = 0.5;
   Recorder recorder;
-  const auvest::MissionResult result = auvest::fly_mission<float>(
-      s, std::strtoull(argv[9], nullptr, 10), 0,
-      [&recorder](const MissionStep& step) { recorder(step); });
+  const auvest::MissionResult result =
+      auvest::fly_mission<float>(s, std::strtoull(argv[9], nullptr, 10), 0,
+                                 [&recorder](const MissionStep& step) { recorder(step); });
   return result.status == auvest::Status::kOk ? 0 : 1;
 }

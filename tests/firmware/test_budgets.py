@@ -52,7 +52,7 @@ def test_a_range_takes_at_most_15_000_cycles(rows):
 
 
 def test_guidance_and_control_take_at_most_20_000_cycles(rows):
-    """On legs and arcs; the period in which a leg is switched forms the next one, and takes more."""
+    """On legs and arcs; a period that switches the leg forms the next one, and takes more."""
     assert rows["guidance_control"].cycles_median <= budgets.MAX_GUIDANCE_CONTROL == 20_000
 
 

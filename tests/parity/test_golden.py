@@ -2,7 +2,8 @@
 
 ``golden.json`` has the SHA-256 of each record and of its trace in Python (of a vehicle: on the
 host, which has Python's bits), as they were when they were first carried to the targets; the other
-tests here say that all targets have them. A change that means to change bits says so by writing the file anew:
+tests here say that all targets have them. A change that means to change bits says so by writing
+the file anew:
 
     python -m tests.parity.test_golden
 """

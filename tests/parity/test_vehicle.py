@@ -130,7 +130,7 @@ def test_a_build_that_fuses_products_is_noticed(name, records, replay, traces):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_nothing_is_refused_and_every_number_is_one(name, records, traces):
+def test_nothing_is_refused_and_every_number_is_one(name, traces):
     rows = traces(REFERENCE, name)
     assert not rows["status"].any()
     for field in set(rows.dtype.names) - {"status", "nis", "weight", "spare"}:

@@ -99,12 +99,13 @@ struct AddedMass {
 
 /// tau <- tau - C(nu) nu for a symmetric M; `nu` has 0 where a projection drops the axis.
 template <class Freedom, class Value>
-AUVEST_OUTLINE void subtract_coriolis(const SparseMatrix<typename math::ScalarOf<Value>::Type, 6>& M,
-                                      const Value* nu, Value* tau, Freedom) {
+AUVEST_OUTLINE void subtract_coriolis(
+    const SparseMatrix<typename math::ScalarOf<Value>::Type, 6>& M, const Value* nu, Value* tau,
+    Freedom) {
   // A hull that only yaws meets P in x and y, and no H.
   const bool tilts = Freedom::keeps(kRoll) || Freedom::keeps(kPitch);
   const int rows = tilts ? 6 : 2;
-  Value momentum[6];  // P, H
+  Value momentum[6];            // P, H
   M.times(nu, rows, momentum);  // [HULL C1]
   const Value* const P = momentum;
   const Value* const H = momentum + 3;

@@ -29,8 +29,8 @@ void bluerov2_frame(Params& p) {
   p.body.ixx_kg_m2 = Scalar(0.26);
   p.body.iyy_kg_m2 = Scalar(0.23);
   p.body.izz_kg_m2 = Scalar(0.37);
-  // As numbers, so that they are the same floats wherever they are rounded: g = 9.82 m/s^2 times the
-  // mass, and times 0.0134 m^3 of fresh water, 1000 kg/m^3.
+  // As numbers, so that they are the same floats wherever they are rounded: g = 9.82 m/s^2 times
+  // the mass, and times 0.0134 m^3 of fresh water, 1000 kg/m^3.
   p.restoring.weight_n = Scalar(132.57);
   p.restoring.buoyancy_n = Scalar(131.588);
   p.added_mass.surge_kg = Scalar(6.36);
