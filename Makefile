@@ -141,6 +141,8 @@ bench: build-release install-editable ## time per step beside filterpy, NumPy, N
 	$(PY) cpp/benchmarks/speed.py build/release/cpp/benchmarks/ukf_step --write docs/speed.md
 	OPENBLAS_NUM_THREADS=1 $(PY) cpp/benchmarks/slat_speed.py \
 	    build/release/cpp/benchmarks --write docs/speed_slat.md
+	OPENBLAS_NUM_THREADS=1 $(PY) cpp/benchmarks/vehicle_speed.py \
+	    build/release/cpp/benchmarks --write docs/speed_vehicle.md
 	$(PY) cpp/benchmarks/startup.py --write docs/speed_startup.md
 
 math-accuracy: build-release ## errors of the float functions over all 2^32 arguments

@@ -32,6 +32,7 @@ from auvest.scenarios.paper_aukf import FilterName, paper_filter, paper_noise
 from auvest.scenarios.tracking import Scenario, Track, simulate
 from firmware.parity.slatf import fields_of, paper_world
 from firmware.parity.targets import AVR_PARTICLES
+from firmware.parity.vehicle import MissionRecord, zigzag
 
 ROOT = Path(__file__).resolve().parents[1]
 BUDGETS = ROOT / "firmware" / "budgets.csv"
@@ -54,6 +55,11 @@ STEPS = {
     "aukf_covariance_budget": 1_000,
 }
 STEPS.update(robust_ekf_predict=1_000, robust_ekf_update=1_000)
+#: Periods of 0.1 s of a mission with two legs and the arc between them, a fix every fifth.
+STEPS.update(heading_filter=1_300, model_aided_predict=1_300, guidance_control=1_300)
+STEPS.update(model_aided_update=259)
+STEPS.update(hull3_rk4=500, hull3_semi_implicit=500, hull6_rk4=500, hull6_semi_implicit=500)
+STEPS.update(rov_allocation=500, rov_thrust_inverse=500)
 
 #: Particles of SlatfJoint: whole blocks that the RAM holds beside the stack.
 JOINT_PARTICLES = 32
@@ -137,7 +143,17 @@ _IMM = "Imm<{}>".format(
     )
 )
 
-#: The two programs of the range filter are one, of which the section with number 1 is reported.
+#: Parts of a period of the mission, of which the one with number 1 is reported.
+_MISSION_SECTIONS = {
+    "heading_filter": "HEADING",
+    "model_aided_predict": "PREDICT",
+    "model_aided_update": "UPDATE",
+    "guidance_control": "STEER",
+}
+_OTHERS = (("HEADING", "2"), ("PREDICT", "3"), ("UPDATE", "4"), ("STEER", "5"))
+
+#: The two programs of the range filter are one, of which the section with number 1 is reported; so
+#: are those of a mission and of the allocation.
 _PROGRAMS: Mapping[str, Program] = {
     "empty": ("empty", {}),
     "ekf": _filter("auvest::Ekf<Process>", "Process()", _FIXED_STEP),
@@ -157,6 +173,17 @@ _PROGRAMS: Mapping[str, Program] = {
     ),
     "robust_ekf_predict": ("range_filter", {"PREDICT": "1", "UPDATE": "2"}),
     "robust_ekf_update": ("range_filter", {"PREDICT": "2", "UPDATE": "1"}),
+    **{
+        program: ("mission", {name: "1" if name == first else other for name, other in _OTHERS})
+        for program, first in _MISSION_SECTIONS.items()
+    },
+    **{
+        f"hull{n}_{method}": ("hull", {"FREEDOM": freedom, "METHOD": kind})
+        for n, freedom in ((3, "ThreeDof"), (6, "SixDof"))
+        for method, kind in (("rk4", "Rk4"), ("semi_implicit", "SemiImplicit"))
+    },
+    "rov_allocation": ("allocation", {"ALLOCATE": "1", "INVERT": "2"}),
+    "rov_thrust_inverse": ("allocation", {"ALLOCATE": "2", "INVERT": "1"}),
     "slatf1": _slat("Slatf1", AVR_PARTICLES),
     "slatf2": _slat("Slatf2", AVR_PARTICLES),
     "slatf_joint": _slat("SlatfJoint", JOINT_PARTICLES),
@@ -183,8 +210,11 @@ def _slatf_record() -> bytes:
 
 def _record(program: str) -> bytes:
     """Start, variances and the steps of a vehicle that circles through the station."""
-    if _PROGRAMS[program][0] == "range_filter":
+    template = _PROGRAMS[program][0]
+    if template == "range_filter":
         return _range_record(STEPS[program])
+    if template in ("mission", "hull", "allocation"):
+        return _vehicle_record(template)
     adaptive = program.startswith("aukf")
     name: FilterName = "aukf" if adaptive else "ekf" if program == "ekf" else "ukf"
     filter_ = paper_filter(name, noise=paper_noise("normal"), track="turn", dtype="float32")
@@ -221,6 +251,20 @@ def _range_record(steps: int) -> bytes:
     z += rng.standard_normal(steps) * np.where(rng.random(steps) < 0.1, 10.0, 1.0)
     rows = np.column_stack([motion, leader, z])
     return np.concatenate([[4.0], rows.ravel(), np.full(6, np.nan)]).astype("<f4").tobytes()
+
+
+def _vehicle_record(template: str) -> bytes:
+    """A mission's readings; a torpedo's commands; demands on an ROV, one of four out of reach."""
+    if template == "mission":
+        record = MissionRecord(name="arcs", arc_m=15.0, seconds=130.0)
+        told = b"".join(row.tobytes() for row in record.readings)
+        return record.start_m.tobytes() + told + np.full(9, np.nan, "<f4").tobytes()
+    if template == "hull":
+        return np.append(zigzag(500, 0.05), np.full((1, 3), np.nan, "<f4"), axis=0).tobytes()
+    rng = np.random.default_rng(1)
+    demands = rng.standard_normal((500, 6)) * [20.0, 20.0, 20.0, 1.0, 1.0, 4.0]
+    demands[::4] *= 4
+    return np.append(demands, np.full((1, 6), np.nan), axis=0).astype("<f4").tobytes()
 
 
 # ---- Measure -------------------------------------------------------------------------------------
@@ -465,7 +509,41 @@ def page(rows: list[Row]) -> str:
         verdict = "met" if figure.met else "**not met**"
         lines.append(f"| {figure.name} | {figure.limit:,} | {measured} | {verdict} |")
     lines += slatf_page(rows)
+    lines += vehicle_page(rows)
     return "\n".join([*lines, ""])
+
+
+#: What the vehicle's own part of a period is made of; cycles that were asked for, in the median.
+PERIOD_S = 0.1
+PERIOD_PARTS = ("heading_filter", "model_aided_predict", "guidance_control")
+MAX_GUIDANCE_CONTROL = 20_000
+
+
+def vehicle_page(rows: list[Row]) -> list[str]:
+    """Return the lines of the page on the vehicle: a period of a mission."""
+    cycles = {row.program: row.cycles_median or 0 for row in rows}
+    control = cycles["guidance_control"]
+    plain = sum(cycles[name] for name in PERIOD_PARTS)
+    fixed = plain + cycles["model_aided_update"]
+    period = 16e6 * PERIOD_S
+    return [
+        "",
+        "## What a vehicle takes",
+        "",
+        "Ten times a second: `heading_filter`, `model_aided_predict` (EKF of dead reckoning with the",
+        "current in its state, IGG and the recovery), `model_aided_update` where there is a fix, and",
+        "`guidance_control`: two legs of a plan and the arc between them, crab feed-forward, and the",
+        "autopilot of heading, speed, depth and pitch. The four are one program of which a part is",
+        "counted; the largest step of `guidance_control` is the one that switches from an arc to a",
+        "leg. `hull3` is the torpedo in the plane, `hull6` in six degrees of freedom, one checked",
+        "step; `rov_allocation` gives a demand to eight thrusters by priority, one of four out of",
+        "reach, and `rov_thrust_inverse` finds the eight inputs by Newton's method.",
+        "",
+        f"Guidance and control: {control:,} cycles in the median, {MAX_GUIDANCE_CONTROL:,} asked for"
+        f" ({'met' if control <= MAX_GUIDANCE_CONTROL else '**not met**'}). A period without a fix",
+        f"takes {plain:,} cycles, {plain / period:.1%} of it, and one with a fix {fixed:,}, "
+        f"{fixed / period:.1%}.",
+    ]
 
 
 def slatf_page(rows: list[Row]) -> list[str]:

@@ -44,6 +44,19 @@ struct MissionResult {
   std::uint32_t refused = 0;  ///< fixes that the filter did not take
 };
 
+/// What the sensors told the vehicle in a step; NaN: nothing, and without noise all of it.
+struct MissionReadings {
+  double compass_rad = std::numeric_limits<double>::quiet_NaN();
+  double pitch_rate_rad_s = std::numeric_limits<double>::quiet_NaN();
+  double yaw_rate_rad_s = std::numeric_limits<double>::quiet_NaN();
+  double depth_m = std::numeric_limits<double>::quiet_NaN();
+  double log_m_s[2] = {std::numeric_limits<double>::quiet_NaN(),
+                       std::numeric_limits<double>::quiet_NaN()};
+  double pitch_rad = std::numeric_limits<double>::quiet_NaN();  ///< as it is
+  double fix[2] = {std::numeric_limits<double>::quiet_NaN(),    ///< range [m], bearing [rad]
+                   std::numeric_limits<double>::quiet_NaN()};
+};
+
 /// One step, after its command.
 struct MissionStep {
   const VehicleTruth& truth;
@@ -59,6 +72,7 @@ struct MissionStep {
   double nis;            ///< of that fix
   double nees_position;  ///< of the estimate, 2 on average; NaN without a filter
   double nees;           ///< of all states that the truth has: 4 on average; NaN without
+  const MissionReadings& readings;
 };
 
 namespace detail {
@@ -139,79 +153,6 @@ struct SquareMean {
   double root() const { return count > 0 ? math::sqrt(sum / count) : 0.0; }
 };
 
-/// The instruments on board and what the vehicle makes of them: the readings of its controllers,
-/// and what drives the model-aided filter.
-template <class Scalar>
-class MissionSensors {
- public:
-  AutopilotReadings<Scalar> now;
-  Vector<Scalar, 3> input;  ///< speed ahead and to starboard through the water, heading
-
-  MissionSensors(const MissionScenario& s, std::uint64_t seed, std::uint64_t stream)
-      : compass_(s.compass, each(s), math::Random(seed, stream + 1)),
-        gyro_(s.gyro, each(s), math::Random(seed, stream + 2)),
-        depth_(s.depth, each(s), math::Random(seed, stream + 3)),
-        log_(s.log, each(s), math::Random(seed, stream + 4)) {
-    math::set_zero(input);
-  }
-
-  /// The truth, as it is.
-  void take(const VehicleTruth& truth) {
-    now.heading_rad = Scalar(math::wrap(truth.pose[5]));
-    now.yaw_rate_rad_s = Scalar(truth.ground[5]);
-    now.pitch_rad = Scalar(truth.pose[4]);
-    now.pitch_rate_rad_s = Scalar(truth.ground[4]);
-    now.speed_m_s = Scalar(truth.water[0]);
-    now.depth_m = Scalar(truth.pose[2]);
-  }
-
-  /// What the instruments say of it, dt seconds after the last time.
-  void read(const VehicleTruth& truth, Scalar dt) {
-    compass_.sample(truth);
-    gyro_.sample(truth);
-    depth_.sample(truth);
-    log_.sample(truth);
-    now.pitch_rad = Scalar(truth.pose[4]);
-    Reading<3> rates;
-    while (gyro_.take(truth.time_s, rates)) {
-      now.pitch_rate_rad_s = Scalar(rates.value[1]);
-      now.yaw_rate_rad_s = Scalar(rates.value[2]);
-    }
-    heading_.predict(now.yaw_rate_rad_s, dt);
-    Reading<1> number;
-    while (compass_.take(truth.time_s, number)) {
-      const Scalar psi = Scalar(number.value[0]);
-      if (heading_.initialised()) {
-        heading_.update(psi);
-      } else {
-        heading_.restart(psi);
-      }
-    }
-    now.heading_rad = heading_.heading_rad();
-    while (depth_.take(truth.time_s, number)) now.depth_m = Scalar(number.value[0]);
-    Reading<2> speeds;
-    while (log_.take(truth.time_s, speeds)) {
-      now.speed_m_s = Scalar(speeds.value[0]);
-      input(0) = Scalar(speeds.value[0]);
-      input(1) = Scalar(speeds.value[1]);
-    }
-    input(2) = now.heading_rad;
-  }
-
- private:
-  static SensorTiming each(const MissionScenario& s) {
-    SensorTiming timing;
-    timing.period_s = s.period_s;
-    return timing;
-  }
-
-  VehicleSensor<CompassDevice> compass_;
-  VehicleSensor<GyroDevice> gyro_;
-  VehicleSensor<DepthDevice> depth_;
-  VehicleSensor<LogDevice> log_;
-  HeadingFilter<Scalar> heading_;
-};
-
 /// The current of a run: constant, or a random walk.
 class MissionCurrent {
  public:
@@ -239,6 +180,137 @@ class MissionCurrent {
  private:
   math::Random random_;
   double step_;
+};
+
+/// What a run meets: the current, the hull, its sensors, and how wrong the first estimate is. All
+/// is drawn from the run's own streams.
+template <class Freedom>
+class MissionWorld {
+  struct Draw {
+    double towards_rad;
+    double error[2];
+
+    explicit Draw(math::Random random) {
+      towards_rad = math::two_pi<double>() * random.uniform<double>();
+      random.normal_pair(error[0], error[1]);
+    }
+  };
+  static std::uint64_t stream(std::uint32_t run) { return 16 * static_cast<std::uint64_t>(run); }
+  static SensorTiming each(const MissionScenario& s) {
+    SensorTiming timing;
+    timing.period_s = s.period_s;
+    return timing;
+  }
+
+  MissionWorld(const MissionScenario& s, const double* start, double heading, std::uint64_t seed,
+               std::uint32_t run, const Draw& draw)
+      : current(s, draw.towards_rad, math::Random(seed, stream(run) + 6)),
+        guess_m{start[0] + s.initial_error_m * draw.error[0],
+                start[1] + s.initial_error_m * draw.error[1]},
+        hull(start, s.depth_m, heading, s.speed_m_s, current.value),
+        compass(s.compass, each(s), math::Random(seed, stream(run) + 1)),
+        gyro(s.gyro, each(s), math::Random(seed, stream(run) + 2)),
+        depth(s.depth, each(s), math::Random(seed, stream(run) + 3)),
+        log(s.log, each(s), math::Random(seed, stream(run) + 4)),
+        usbl(s.usbl, s.usbl_timing, math::Random(seed, stream(run) + 5)) {}
+
+ public:
+  /// At this place [m] and heading [rad], at the scenario's speed.
+  MissionWorld(const MissionScenario& s, const double* start, double heading, std::uint64_t seed,
+               std::uint32_t run)
+      : MissionWorld(s, start, heading, seed, run, Draw(math::Random(seed, stream(run)))) {}
+
+  /// All sensors but USBL, which reads when it is asked, read if their clocks say so.
+  void sample() {
+    compass.sample(hull.truth());
+    gyro.sample(hull.truth());
+    depth.sample(hull.truth());
+    log.sample(hull.truth());
+  }
+
+  /// The command is held for dt seconds, until time_s.
+  Status advance(const double* command, double dt, double time_s) {
+    current.advance();
+    hull.set_current(current.value);
+    return hull.advance(command, dt, time_s);
+  }
+
+  MissionCurrent current;
+  const double guess_m[2];  ///< the first estimate of the place
+  MissionHull<Freedom> hull;
+  VehicleSensor<CompassDevice> compass;
+  VehicleSensor<GyroDevice> gyro;
+  VehicleSensor<DepthDevice> depth;
+  VehicleSensor<LogDevice> log;
+  VehicleSensor<UsblDevice> usbl;
+};
+
+/// What the vehicle makes of its sensors: the readings of its controllers, and what drives the
+/// model-aided filter.
+template <class Scalar>
+class MissionSensors {
+ public:
+  AutopilotReadings<Scalar> now;
+  Vector<Scalar, 3> input;  ///< speed ahead and to starboard through the water, heading
+  MissionReadings told;     ///< in this step
+
+  MissionSensors() { math::set_zero(input); }
+
+  /// The truth, as it is.
+  void take(const VehicleTruth& truth) {
+    told = MissionReadings();
+    told.pitch_rad = truth.pose[4];
+    now.heading_rad = Scalar(math::wrap(truth.pose[5]));
+    now.yaw_rate_rad_s = Scalar(truth.ground[5]);
+    now.pitch_rad = Scalar(truth.pose[4]);
+    now.pitch_rate_rad_s = Scalar(truth.ground[4]);
+    now.speed_m_s = Scalar(truth.water[0]);
+    now.depth_m = Scalar(truth.pose[2]);
+  }
+
+  /// What the sensors of the world say of it, dt seconds after the last time.
+  template <class World>
+  void read(World& world, Scalar dt) {
+    const VehicleTruth& truth = world.hull.truth();
+    told = MissionReadings();
+    told.pitch_rad = truth.pose[4];
+    world.sample();
+    now.pitch_rad = Scalar(truth.pose[4]);
+    Reading<3> rates;
+    while (world.gyro.take(truth.time_s, rates)) {
+      told.pitch_rate_rad_s = rates.value[1];
+      told.yaw_rate_rad_s = rates.value[2];
+      now.pitch_rate_rad_s = Scalar(rates.value[1]);
+      now.yaw_rate_rad_s = Scalar(rates.value[2]);
+    }
+    heading_.predict(now.yaw_rate_rad_s, dt);
+    Reading<1> number;
+    while (world.compass.take(truth.time_s, number)) {
+      told.compass_rad = number.value[0];
+      const Scalar psi = Scalar(number.value[0]);
+      if (heading_.initialised()) {
+        heading_.update(psi);
+      } else {
+        heading_.restart(psi);
+      }
+    }
+    now.heading_rad = heading_.heading_rad();
+    while (world.depth.take(truth.time_s, number)) {
+      told.depth_m = number.value[0];
+      now.depth_m = Scalar(number.value[0]);
+    }
+    Reading<2> speeds;
+    while (world.log.take(truth.time_s, speeds)) {
+      for (int i = 0; i < 2; ++i) told.log_m_s[i] = speeds.value[i];
+      now.speed_m_s = Scalar(speeds.value[0]);
+      input(0) = Scalar(speeds.value[0]);
+      input(1) = Scalar(speeds.value[1]);
+    }
+    input(2) = now.heading_rad;
+  }
+
+ private:
+  HeadingFilter<Scalar> heading_;
 };
 
 /// What is summed up over a run.
@@ -271,25 +343,16 @@ template <class Scalar, class Freedom, class Navigator, class Sink>
 MissionResult fly_with(const MissionScenario& s, std::uint64_t seed, std::uint32_t run,
                        Sink& sink) {
   MissionResult result;
-  const std::uint64_t stream = 16 * static_cast<std::uint64_t>(run);
-  math::Random world(seed, stream);
-  const double drawn = math::two_pi<double>() * world.uniform<double>();
-  double error[2];
-  world.normal_pair(error[0], error[1]);
-  MissionCurrent stream_of(s, drawn, math::Random(seed, stream + 6));
-  const double* const current = stream_of.value;
-
   MissionPath<Scalar> path(s);
   double start[2];
   double heading = 0;
   path.start(start, heading);
-  MissionHull<Freedom> hull(start, s.depth_m, heading, s.speed_m_s, current);
+  MissionWorld<Freedom> world(s, start, heading, seed, run);
+  const double* const current = world.current.value;
+  MissionSensors<Scalar> sensors;
   const bool exact = s.estimate == MissionEstimate::kTruth;
-  MissionSensors<Scalar> sensors(s, seed, stream);
-  VehicleSensor<UsblDevice> usbl(s.usbl, s.usbl_timing, math::Random(seed, stream + 5));
-
   double guess[2];
-  for (int i = 0; i < 2; ++i) guess[i] = start[i] + (exact ? 0.0 : s.initial_error_m * error[i]);
+  for (int i = 0; i < 2; ++i) guess[i] = exact ? start[i] : world.guess_m[i];
   Navigator navigator(s, guess, heading);
   MissionLaw<Scalar> law(s);
   Autopilot<Scalar> autopilot;
@@ -312,7 +375,7 @@ MissionResult fly_with(const MissionScenario& s, std::uint64_t seed, std::uint32
   MissionTally tally;
   std::uint32_t k = 0;
   for (;; ++k) {
-    const VehicleTruth& truth = hull.truth();
+    const VehicleTruth& truth = world.hull.truth();
     const double most = s.track == MissionTrack::kCircle ? s.circle_s : s.most_s;
     if (truth.time_s >= most - 1e-9) break;
 
@@ -320,7 +383,7 @@ MissionResult fly_with(const MissionScenario& s, std::uint64_t seed, std::uint32
     if (exact) {
       sensors.take(truth);
     } else {
-      sensors.read(truth, dt);
+      sensors.read(world, dt);
     }
 
     // Predict and correct.
@@ -334,12 +397,13 @@ MissionResult fly_with(const MissionScenario& s, std::uint64_t seed, std::uint32
       if (k > 0) result.status = navigator.predict(dt, sensors.input);
       if (result.status != Status::kOk) return result;
       if (k >= next) {
-        usbl.ask(truth);
+        world.usbl.ask(truth);
         asked = k;
         next = k + steps_of(navigator.interval());
       }
       Reading<2> fix;
-      while (usbl.take(truth.time_s, fix)) {
+      while (world.usbl.take(truth.time_s, fix)) {
+        for (int i = 0; i < 2; ++i) sensors.told.fix[i] = fix.value[i];
         Vector<Scalar, 2> z;
         z(0) = Scalar(fix.value[0]);
         z(1) = Scalar(fix.value[1]);
@@ -401,13 +465,12 @@ MissionResult fly_with(const MissionScenario& s, std::uint64_t seed, std::uint32
         fixed,
         fixed ? navigator.nis : std::numeric_limits<double>::quiet_NaN(),
         0,
-        0};
+        0,
+        sensors.told};
     navigator.judge(truth, current, step.nees_position, step.nees);
     sink(static_cast<const MissionStep&>(step));
 
-    stream_of.advance();
-    hull.set_current(current);
-    result.status = hull.advance(command, s.period_s, (k + 1) * s.period_s);
+    result.status = world.advance(command, s.period_s, (k + 1) * s.period_s);
     if (result.status != Status::kOk) return result;
   }
   result.finished = result.finished || s.track == MissionTrack::kCircle;

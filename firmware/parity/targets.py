@@ -1,7 +1,7 @@
 """The targets on which a record is replayed: how the program is built and how it is run.
 
 Each target compiles one of the ``main`` functions beside this file around ``replay.hpp`` or
-``slatf_replay.hpp``.
+``slatf_replay.hpp`` or ``vehicle_replay.hpp``.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Target:
     library : tuple of Path
         What the Arduino library compiles beside the headers.
     header : str
-        What is replayed: ``replay.hpp`` or ``slatf_replay.hpp``.
+        What is replayed: ``replay.hpp``, ``slatf_replay.hpp`` or ``vehicle_replay.hpp``.
     """
 
     name: str
@@ -209,3 +209,9 @@ SLATF_TARGETS = (
         for lanes in ("sse2", "default_arch")
     ),
 )
+
+
+# ---- A vehicle -----------------------------------------------------------------------------------
+
+#: The same for hulls, guidance, control and the model-aided filter.
+VEHICLE_TARGETS = tuple(replace(target, header="vehicle_replay.hpp") for target in TARGETS)

@@ -52,6 +52,11 @@ def test_a_range_takes_at_most_15_000_cycles(rows):
     assert rows["robust_ekf_update"].cycles_max <= 15_000
 
 
+def test_guidance_and_control_take_at_most_20_000_cycles(rows):
+    """On legs and arcs; a period that switches the leg forms the next one, and takes more."""
+    assert rows["guidance_control"].cycles_median <= budgets.MAX_GUIDANCE_CONTROL == 20_000
+
+
 ROW = budgets.Row("atmega2560", "aukf", 10_000, 300, 400, 1_000, 2_000, 3_000)
 
 

@@ -1,8 +1,9 @@
 """The bits of before: what a change of structure must leave as it was.
 
-``golden.json`` has the SHA-256 of each record and of its trace in Python, as they were when the
-filters were first carried to the targets; the other tests here say that all targets have Python's
-bits. A change that means to change bits says so by writing the file anew:
+``golden.json`` has the SHA-256 of each record and of its trace in Python (of a vehicle: on the
+host, which has Python's bits), as they were when they were first carried to the targets; the other
+tests here say that all targets have them. A change that means to change bits says so by writing
+the file anew:
 
     python -m tests.parity.test_golden
 """
@@ -11,13 +12,16 @@ from __future__ import annotations
 
 import hashlib
 import json
+import tempfile
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from firmware.parity import slatf
+from firmware.parity import slatf, vehicle
+from firmware.parity.targets import VEHICLE_TARGETS
 from tests.parity import python_leg, records, robust_records, slatf_python_leg
 
 FILE = Path(__file__).with_name("golden.json")
@@ -49,7 +53,24 @@ def all_traces() -> dict[str, Callable[[], list[str]]]:
             digest(r.to_bytes()),
             digest(*slatf_python_leg.replay_in_python(r, "scalar")),
         ]
+    for name in vehicle.NAMES:
+        found[f"vehicle/{name}"] = lambda n=name: vehicle_digests(n)
     return found
+
+
+@cache
+def vehicle_program() -> tuple[Path, tempfile.TemporaryDirectory]:
+    folder = tempfile.TemporaryDirectory()
+    return VEHICLE_TARGETS[0].build(Path(folder.name) / "replay"), folder
+
+
+def vehicle_digests(name: str) -> list[str]:
+    record = next(record for record in vehicle.all_records() if record.name == name)
+    program, folder = vehicle_program()
+    files = [Path(folder.name) / part for part in ("record", "trace")]
+    files[0].write_bytes(record.to_bytes())
+    trace = VEHICLE_TARGETS[0].replay(program, *files, None)
+    return [digest(record.to_bytes()), digest(record.trace_of(trace))]
 
 
 TRACES = all_traces()

@@ -13,9 +13,11 @@
 #pragma once
 
 #include "auvest/math/basic.hpp"
+#include "auvest/math/select.hpp"
 #include "auvest/status.hpp"
 #include "auvest/types.hpp"
 #include "auvest/vehicle/freedom.hpp"
+#include "auvest/vehicle/sparse_matrix.hpp"
 
 namespace auvest {
 inline namespace AUVEST_INSTRUCTIONS {
@@ -96,28 +98,16 @@ struct AddedMass {
   };
 };
 
-/// sum_j row[j] v[j] over the axes that a projection keeps, in the order of j. Coefficients that
-/// are 0, as most are in a hull with planes of symmetry, cost no arithmetic.
-template <class Freedom, class Scalar, class Value>
-AUVEST_INLINE Value row_times(const Scalar* row, const Value* v, Freedom) {
-  Value sum = Value(0);
-  AUVEST_UNROLL
-  for (int j = 0; j < 6; ++j) {
-    if (Freedom::keeps(j) && row[j] != Scalar(0)) sum = sum + Value(row[j]) * v[j];
-  }
-  return sum;
-}
-
 /// tau <- tau - C(nu) nu for a symmetric M; `nu` has 0 where a projection drops the axis.
-template <class Freedom, class Scalar, class Value>
-AUVEST_OUTLINE void subtract_coriolis(const Matrix<Scalar, 6, 6>& M, const Value* nu, Value* tau,
-                                      Freedom freedom) {
+template <class Freedom, class Value>
+AUVEST_OUTLINE void subtract_coriolis(
+    const SparseMatrix<typename math::ScalarOf<Value>::Type, 6>& M, const Value* nu, Value* tau,
+    Freedom) {
   // A hull that only yaws meets P in x and y, and no H.
   const bool tilts = Freedom::keeps(kRoll) || Freedom::keeps(kPitch);
   const int rows = tilts ? 6 : 2;
-  Value momentum[6];  // P, H
-  AUVEST_UNROLL
-  for (int i = 0; i < rows; ++i) momentum[i] = row_times(&M(i, 0), nu, freedom);  // [HULL C1]
+  Value momentum[6];            // P, H
+  M.times(nu, rows, momentum);  // [HULL C1]
   const Value* const P = momentum;
   const Value* const H = momentum + 3;
   AUVEST_UNROLL

@@ -113,6 +113,8 @@ class Allocation {
     math::set_zero(result.thrust);
     result.saturated = false;
     for (std::uint8_t level = 0; level < kLevels; ++level) {
+      result.scale[level] = Scalar(1);
+      if (!serves(level)) continue;
       Thrust share;
       math::set_zero(share);
       for (int i = 0; i < Count; ++i) {
@@ -145,6 +147,14 @@ class Allocation {
   }
 
  private:
+  /// True if an axis is of this level.
+  bool serves(std::uint8_t level) const {
+    for (const std::uint8_t own : params.priority) {
+      if (own == level) return true;
+    }
+    return false;
+  }
+
   Inverse inverse_;
 };
 

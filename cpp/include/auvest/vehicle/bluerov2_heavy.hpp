@@ -25,14 +25,15 @@ void place_thruster(Mount& mount, Scalar x, Scalar y, Scalar z, Scalar forward, 
 /// What both BlueROV2 have: weight, hull, four horizontal thrusters and their curve.
 template <class Scalar, class Params>
 void bluerov2_frame(Params& p) {
-  const Scalar g = Scalar(9.82);
   p.restoring.zb_m = Scalar(-0.01);
   p.body.mass_kg = Scalar(13.5);
   p.body.ixx_kg_m2 = Scalar(0.26);
   p.body.iyy_kg_m2 = Scalar(0.23);
   p.body.izz_kg_m2 = Scalar(0.37);
-  p.restoring.weight_n = p.body.mass_kg * g;
-  p.restoring.buoyancy_n = Scalar(13.4) * g;  // 0.0134 m^3 of fresh water, 1000 kg/m^3
+  // As numbers, so that they are the same floats wherever they are rounded: g = 9.82 m/s^2 times
+  // the mass, and times 0.0134 m^3 of fresh water, 1000 kg/m^3.
+  p.restoring.weight_n = Scalar(132.57);
+  p.restoring.buoyancy_n = Scalar(131.588);
   p.added_mass.surge_kg = Scalar(6.36);
   p.added_mass.sway_kg = Scalar(7.12);
   p.added_mass.heave_kg = Scalar(18.68);

@@ -19,8 +19,8 @@ inline namespace AUVEST_INSTRUCTIONS {
 
 /// I0 [m^3/s^2] and I1 [m^4/s^2] of a hull of `length` [m] in the flow v + x r.
 template <class Scalar, class Value>
-AUVEST_OUTLINE void cross_flow_integrals(Scalar length, const Value& v, const Value& r, Value& i0,
-                                         Value& i1) {
+AUVEST_OUTLINE AUVEST_INLINE void cross_flow_integrals(Scalar length, const Value& v,
+                                                       const Value& r, Value& i0, Value& i1) {
   const Scalar third = Scalar(1) / Scalar(3);
   const Value a = math::absolute(v);
   const Value b = math::absolute(r) * Value(Scalar(0.5) * length);

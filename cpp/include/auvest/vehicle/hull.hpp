@@ -34,6 +34,7 @@
 #include "auvest/vehicle/freedom.hpp"
 #include "auvest/vehicle/restoring.hpp"
 #include "auvest/vehicle/rigid_body.hpp"
+#include "auvest/vehicle/sparse_matrix.hpp"
 
 namespace auvest {
 inline namespace AUVEST_INSTRUCTIONS {
@@ -73,11 +74,12 @@ class Hull {
 
   explicit Hull(const Params& p)
       : vehicle_(p), added_(p.added_mass), restoring_(p.restoring, p.body) {
-    math::set_zero(coriolis_);
-    RigidBody<Scalar>(p.body).add_to(coriolis_);
-    math::copy(coriolis_, mass_);
+    const bool all = Vehicle::kAddedCoriolis && p.added_mass.munk;
+    math::set_zero(mass_);
+    RigidBody<Scalar>(p.body).add_to(mass_);
+    if (!all) keep_for_coriolis();
     added_.add_to(mass_);
-    if (Vehicle::kAddedCoriolis && p.added_mass.munk) math::copy(mass_, coriolis_);
+    if (all) keep_for_coriolis();
     invert();
   }
 
@@ -174,16 +176,7 @@ class Hull {
                                    const Value* actuators, Value* result) const {
     Value tau[6];
     forces(a, velocities, actuators, tau);
-    AUVEST_UNROLL
-    for (int i = 0; i < kVelocities; ++i) {
-      Value sum = Value(0);
-      AUVEST_UNROLL
-      for (int j = 0; j < kVelocities; ++j) {
-        if (inverse_(i, j) == Scalar(0)) continue;
-        sum = sum + Value(inverse_(i, j)) * tau[Freedom::axis(j)];
-      }
-      result[i] = sum;  // [AUKF 3]
-    }
+    inverse_.times(tau, kVelocities, result);  // [AUKF 3]
   }
 
   /// tau - C nu_r - D nu_r - g, on the axes that are kept.
@@ -218,6 +211,16 @@ class Hull {
     return kept;
   }
 
+  /// The mass matrix as it is now, without the columns of dropped axes: their velocities are 0.
+  void keep_for_coriolis() {
+    for (int i = 0; i < 6; ++i) {
+      for (int j = 0; j < 6; ++j) {
+        if (Freedom::keeps(j)) coriolis_.put(j, mass_(i, j));
+      }
+      coriolis_.end_row();
+    }
+  }
+
   /// (E M E')^-1 from its factors L D L'.
   AUVEST_OUTLINE void invert() {
     constexpr int n = kVelocities;
@@ -227,6 +230,7 @@ class Hull {
     }
     Vector<Scalar, n> pivots;
     math::ldlt(l.data(), n, Scalar(0), pivots.data());
+    Matrix<Scalar, n, n> inverse;
     for (int column = 0; column < n; ++column) {
       Vector<Scalar, n> y;
       for (int i = 0; i < n; ++i) {
@@ -236,18 +240,22 @@ class Hull {
       for (int i = n - 1; i >= 0; --i) {
         y(i) = y(i) * pivots(i);
         for (int k = i + 1; k < n; ++k) y(i) = y(i) - l(k, i) * y(k);
-        inverse_(i, column) = y(i);
+        inverse(i, column) = y(i);
       }
     }
-    math::mirror_lower(inverse_);
+    math::mirror_lower(inverse);
+    for (int i = 0; i < n; ++i) {
+      for (int j = 0; j < n; ++j) inverse_.put(Freedom::axis(j), inverse(i, j));
+      inverse_.end_row();
+    }
   }
 
   Vehicle vehicle_;
   AddedMass<Scalar> added_;
   Restoring<Scalar> restoring_;
-  Matrix<Scalar, 6, 6> mass_;      // M
-  Matrix<Scalar, 6, 6> coriolis_;  // the M of C(nu): all of it, or M_RB
-  Matrix<Scalar, kVelocities, kVelocities> inverse_;
+  Matrix<Scalar, 6, 6> mass_;         // M
+  SparseMatrix<Scalar, 6> coriolis_;  // the M of C(nu): all of it, or M_RB
+  SparseMatrix<Scalar, kVelocities, 6> inverse_;
 };
 
 }  // namespace AUVEST_INSTRUCTIONS

@@ -26,8 +26,8 @@ typename Torpedo<Scalar, Keel_>::Params remus100() {
   p.added_mass.roll_kg_m2 = Scalar(0.035249124426928624);  // 0.3 I_x: fins and fittings
   p.added_mass.pitch_kg_m2 = p.added_mass.yaw_kg_m2 = Scalar(3.5938562541677506);
 
-  // Neutral: W = B.
-  p.restoring.weight_n = p.body.mass_kg * Scalar(9.81);
+  // Neutral: W = B, the mass times 9.81 m/s^2.
+  p.restoring.weight_n = Scalar(313.2493660359013);
   p.restoring.buoyancy_n = p.restoring.weight_n;
 
   // Time constants of 20 s in surge, sway and heave and of 1 s in yaw; damping ratios of 0.3 in
