@@ -683,6 +683,66 @@ class MissionHull {
   VehicleTruth truth_;
 };
 
+/// What a run meets: the current, the hull, its sensors, and how wrong the first estimate is. All
+/// is drawn from the run's own streams.
+template <class Freedom>
+struct MissionWorld {
+ private:
+  struct Draw {
+    double current[2];
+    double error[2];
+
+    Draw(const MissionScenario& s, math::Random random) {
+      const double drawn = math::two_pi<double>() * random.uniform<double>();
+      random.normal_pair(error[0], error[1]);
+      const double towards = s.current_rad == s.current_rad ? s.current_rad : drawn;
+      current[0] = s.current_m_s * math::cos(towards);
+      current[1] = s.current_m_s * math::sin(towards);
+    }
+  };
+  static std::uint64_t stream(std::uint32_t run) { return 16 * static_cast<std::uint64_t>(run); }
+  static SensorTiming each(const MissionScenario& s) {
+    SensorTiming timing;
+    timing.period_s = s.period_s;
+    return timing;
+  }
+
+  MissionWorld(const MissionScenario& s, const double* start, double heading, std::uint64_t seed,
+               std::uint32_t run, const Draw& draw)
+      : current_m_s{draw.current[0], draw.current[1]},
+        guess_m{start[0] + s.initial_error_m * draw.error[0],
+                start[1] + s.initial_error_m * draw.error[1]},
+        hull(start, s.depth_m, heading, s.speed_m_s, draw.current),
+        compass(s.compass, each(s), math::Random(seed, stream(run) + 1)),
+        gyro(s.gyro, each(s), math::Random(seed, stream(run) + 2)),
+        depth(s.depth, each(s), math::Random(seed, stream(run) + 3)),
+        log(s.log, each(s), math::Random(seed, stream(run) + 4)),
+        usbl(s.usbl, s.usbl_timing, math::Random(seed, stream(run) + 5)) {}
+
+ public:
+  /// At this place [m] and heading [rad], at the scenario's speed.
+  MissionWorld(const MissionScenario& s, const double* start, double heading, std::uint64_t seed,
+               std::uint32_t run)
+      : MissionWorld(s, start, heading, seed, run, Draw(s, math::Random(seed, stream(run)))) {}
+
+  /// All sensors but USBL, which reads when it is asked, read if their clocks say so.
+  void sample() {
+    compass.sample(hull.truth());
+    gyro.sample(hull.truth());
+    depth.sample(hull.truth());
+    log.sample(hull.truth());
+  }
+
+  const double current_m_s[2];
+  const double guess_m[2];  ///< the first estimate of the place
+  MissionHull<Freedom> hull;
+  VehicleSensor<CompassDevice> compass;
+  VehicleSensor<GyroDevice> gyro;
+  VehicleSensor<DepthDevice> depth;
+  VehicleSensor<LogDevice> log;
+  VehicleSensor<UsblDevice> usbl;
+};
+
 /// Sum of squares and their number.
 struct SquareMean {
   double sum = 0;
@@ -699,31 +759,16 @@ template <class Scalar, class Freedom, class Navigator, class Sink>
 MissionResult fly_with(const MissionScenario& s, std::uint64_t seed, std::uint32_t run,
                        Sink& sink) {
   MissionResult result;
-  const std::uint64_t stream = 16 * static_cast<std::uint64_t>(run);
-  math::Random world(seed, stream);
-  const double drawn = math::two_pi<double>() * world.uniform<double>();
-  double error[2];
-  world.normal_pair(error[0], error[1]);
-  const double towards = s.current_rad == s.current_rad ? s.current_rad : drawn;
-  const double current[2] = {s.current_m_s * math::cos(towards),
-                             s.current_m_s * math::sin(towards)};
-
   MissionPath<Scalar> path(s);
   double start[2];
   double heading = 0;
   path.start(start, heading);
-  MissionHull<Freedom> hull(start, s.depth_m, heading, s.speed_m_s, current);
+  MissionWorld<Freedom> world(s, start, heading, seed, run);
+  MissionHull<Freedom>& hull = world.hull;
+  const double(&current)[2] = world.current_m_s;
   const bool exact = s.estimate == MissionEstimate::kTruth;
-  SensorTiming each;
-  each.period_s = s.period_s;
-  VehicleSensor<CompassDevice> compass(s.compass, each, math::Random(seed, stream + 1));
-  VehicleSensor<GyroDevice> gyro(s.gyro, each, math::Random(seed, stream + 2));
-  VehicleSensor<DepthDevice> depth(s.depth, each, math::Random(seed, stream + 3));
-  VehicleSensor<LogDevice> log(s.log, each, math::Random(seed, stream + 4));
-  VehicleSensor<UsblDevice> usbl(s.usbl, s.usbl_timing, math::Random(seed, stream + 5));
-
   double guess[2];
-  for (int i = 0; i < 2; ++i) guess[i] = start[i] + (exact ? 0.0 : s.initial_error_m * error[i]);
+  for (int i = 0; i < 2; ++i) guess[i] = exact ? start[i] : world.guess_m[i];
   Navigator navigator(s, guess, heading);
   MissionLaw<Scalar> law(s);
   HeadingFilter<Scalar> heading_filter;
@@ -765,18 +810,15 @@ MissionResult fly_with(const MissionScenario& s, std::uint64_t seed, std::uint32
       now.speed_m_s = Scalar(truth.water[0]);
       now.depth_m = Scalar(truth.pose[2]);
     } else {
-      compass.sample(truth);
-      gyro.sample(truth);
-      depth.sample(truth);
-      log.sample(truth);
+      world.sample();
       Reading<3> rates;
-      while (gyro.take(truth.time_s, rates)) {
+      while (world.gyro.take(truth.time_s, rates)) {
         now.pitch_rate_rad_s = Scalar(rates.value[1]);
         now.yaw_rate_rad_s = Scalar(rates.value[2]);
       }
       if (k > 0) heading_filter.predict(now.yaw_rate_rad_s, dt);
       Reading<1> number;
-      while (compass.take(truth.time_s, number)) {
+      while (world.compass.take(truth.time_s, number)) {
         const Scalar psi = Scalar(number.value[0]);
         if (heading_filter.initialised()) {
           heading_filter.update(psi);
@@ -785,9 +827,9 @@ MissionResult fly_with(const MissionScenario& s, std::uint64_t seed, std::uint32
         }
       }
       now.heading_rad = heading_filter.heading_rad();
-      while (depth.take(truth.time_s, number)) now.depth_m = Scalar(number.value[0]);
+      while (world.depth.take(truth.time_s, number)) now.depth_m = Scalar(number.value[0]);
       Reading<2> speeds;
-      while (log.take(truth.time_s, speeds)) {
+      while (world.log.take(truth.time_s, speeds)) {
         now.speed_m_s = Scalar(speeds.value[0]);
         input(0) = Scalar(speeds.value[0]);
         input(1) = Scalar(speeds.value[1]);
@@ -806,12 +848,12 @@ MissionResult fly_with(const MissionScenario& s, std::uint64_t seed, std::uint32
       if (k > 0) result.status = navigator.predict(dt, input);
       if (result.status != Status::kOk) return result;
       if (k >= next) {
-        usbl.ask(truth);
+        world.usbl.ask(truth);
         asked = k;
         next = k + steps_of(navigator.interval());
       }
       Reading<2> fix;
-      while (usbl.take(truth.time_s, fix)) {
+      while (world.usbl.take(truth.time_s, fix)) {
         Vector<Scalar, 2> z;
         z(0) = Scalar(fix.value[0]);
         z(1) = Scalar(fix.value[1]);
