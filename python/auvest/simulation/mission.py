@@ -283,7 +283,6 @@ def simulate(
         After Ctrl-C; ``partial`` has the runs that are done.
     """
     as_instance("mission", mission, Mission)
-    kernel = Unit() if mission.kernel is None else as_kernel(mission.kernel)
     longest = mission.circle_s if mission.track == "circle" else mission.most_s
     rows = min(int(longest / mission.period_s) + 2, _ROWS) if record else 0
     if mission.runs * rows > MAX_STEPS:
@@ -291,19 +290,13 @@ def simulate(
             f"{mission.runs} runs of {rows} steps are more than {MAX_STEPS:,}: record=False keeps "
             "the numbers of each run alone"
         )
-    values = {name: getattr(mission, name) for name in _DEFAULTS}
-    values.update(
-        track=mission.track,
-        estimate=mission.estimate,
-        guidance=mission.guidance,
-        interval=core_interval(mission.interval, "float64"),
-        kernel=core_kernel(kernel, "float64"),
-        rejections=0 if mission.recovery is None else mission.recovery.rejections,
-        freedom=mission.degrees_of_freedom,
-        dtype=mission.dtype,
-        seed=mission.seed,
-        rows=rows,
-    )
+    values = {
+        **core_scenario(mission),
+        "freedom": mission.degrees_of_freedom,
+        "dtype": mission.dtype,
+        "seed": mission.seed,
+        "rows": rows,
+    }
 
     def part(first: int, count: int) -> dict[str, npt.NDArray[Any]]:
         return _core.fly_missions({**values, "first_run": first, "runs": count})
@@ -328,6 +321,20 @@ def simulate(
             stop.partial = finished(stop.partial)
         raise
     return finished(columns)
+
+
+def core_scenario(mission: Mission) -> dict[str, Any]:
+    """Give a mission as the core takes it."""
+    kernel = Unit() if mission.kernel is None else as_kernel(mission.kernel)
+    return {
+        **{name: getattr(mission, name) for name in _DEFAULTS},
+        "track": mission.track,
+        "estimate": mission.estimate,
+        "guidance": mission.guidance,
+        "interval": core_interval(mission.interval, "float64"),
+        "kernel": core_kernel(kernel, "float64"),
+        "rejections": 0 if mission.recovery is None else mission.recovery.rejections,
+    }
 
 
 def settings(mission: Mission) -> dict[str, Any]:

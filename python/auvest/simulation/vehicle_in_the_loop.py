@@ -1,0 +1,451 @@
+"""A vehicle in the loop: hull and sensors here, the pilot on a chip at the other end of a line.
+
+The chip runs the sketch ``mission``; :class:`Vehicle` answers it. The world is that of
+:func:`auvest.simulation.mission.simulate` with the same seed and run, so the two can be set side by
+side. :func:`fly_on_desk` flies it with the chip's own pilot compiled here, with or without what the
+line adds: numbers rounded to the digits of the text, a command that comes later than its sample.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from auvest import _core, mission_line
+from auvest._core import PilotMode
+from auvest.board import Board, Finished, SerialLine
+from auvest.intervals import FixedInterval
+from auvest.simulation import mission
+from auvest.simulation.mission import Mission
+from auvest.telemetry import LineError, Reader, Row
+
+Floats = npt.NDArray[np.float64]
+
+PERIOD_S = 0.1
+#: From a sample to the command, s, on a line of 115,200 baud: readings, computing, command.
+DELAY_S = 0.02
+_OFF = (0.0, 0.0, 0.0)
+_FROM_REST = (0.0, 0.0, 15.0)
+
+
+def chip_mission(**options: object) -> Mission:
+    """Give the mission that the sketch flies as it is: its filter, guidance and track.
+
+    Parameters
+    ----------
+    **options
+        What is left to choose of :class:`~auvest.simulation.mission.Mission`: the current, the
+        sensors' errors, runs and seed.
+
+    Raises
+    ------
+    ValueError
+        If an option is out of range, or is the sketch's own to choose.
+    """
+    own = {"track", "estimate", "guidance", "interval", "kernel", "recovery", "dtype", "period_s"}
+    own |= {
+        "usbl_noise_m",
+        "usbl_noise_rad",
+        "degrees_of_freedom",
+        "arc_m",
+        "switch_m",
+        "end_m",
+        "lookahead_m",
+        "speed_m_s",
+        "depth_m",
+    }
+    taken = own & options.keys()
+    if taken:
+        raise ValueError(f"{min(taken)} is chosen in the sketch")
+    return mission.source("robust_model_aided", "lawnmower", dtype="float32", **options)
+
+
+def new_pilot(plan: Mission) -> _core.Pilot_float32:
+    """Compile what the sketch has in its config.h and plan.h into a pilot with its bits."""
+    if not isinstance(plan.interval, FixedInterval):
+        raise ValueError("the pilot here has a fixed interval, as the sketch has")
+    settings = {
+        "period_s": plan.period_s,
+        "speed_m_s": plan.speed_m_s,
+        "depth_m": plan.depth_m,
+        "end_m": plan.end_m,
+        "switch_m": plan.switch_m,
+        "lookahead_m": plan.lookahead_m,
+        "station_x_m": 0.0,
+        "station_y_m": 0.0,
+        "sigma_range_m": plan.usbl_noise_m,
+        "sigma_bearing_rad": plan.usbl_noise_rad,
+    }
+    corners = mission.LAWNMOWER.astype(np.float32)
+    return _core.Pilot_float32(corners, settings, plan.interval.interval_s)
+
+
+@dataclass
+class Flight:
+    """What became of a run: a row per sample that was steered under way.
+
+    Attributes
+    ----------
+    pose : list of ndarray, shape (6,)
+        North, east, down, m; roll, pitch, yaw, rad.
+    command : list of (float, float, float)
+        Rudder, stern planes, rad; propeller, rev/s.
+    estimate_m : list of (float, float)
+        Where the pilot takes itself to be.
+    leg : list of int
+        That it is on.
+    finished : bool
+        The plan was flown to its end.
+    """
+
+    pose: list[Floats] = field(default_factory=list)
+    command: list[tuple[float, ...]] = field(default_factory=list)
+    estimate_m: list[tuple[float, float]] = field(default_factory=list)
+    leg: list[int] = field(default_factory=list)
+    finished: bool = False
+
+    def add(self, pose: Floats, command: tuple[float, ...], x: float, y: float, leg: int) -> None:
+        """Add a sample."""
+        self.pose.append(pose)
+        self.command.append(command)
+        self.estimate_m.append((x, y))
+        self.leg.append(leg)
+
+    def beside(self) -> tuple[Floats, Floats]:
+        """Along-track and cross-track of the vehicle on its leg, m."""
+        place = np.array(self.pose)[:, :2]
+        begin = mission.LAWNMOWER[self.leg]
+        leg = mission.LAWNMOWER[np.array(self.leg) + 1] - begin
+        ahead = leg / np.linalg.norm(leg, axis=1, keepdims=True)
+        offset = place - begin
+        cross = offset[:, 1] * ahead[:, 0] - offset[:, 0] * ahead[:, 1]
+        return np.asarray((offset * ahead).sum(axis=1)), np.asarray(cross)
+
+    @property
+    def all_rms_m(self) -> float:
+        """Cross-track error, root mean square, corners too."""
+        return rms(self.beside()[1])
+
+    def settled_rms_m(self, settled_m: float = 50.0) -> float:
+        """Cross-track error from so far into a leg, root mean square."""
+        along, cross = self.beside()
+        return rms(cross[along >= settled_m])
+
+    @property
+    def position_rms_m(self) -> float:
+        """Error of the estimate, root mean square."""
+        error = np.array(self.estimate_m) - np.array(self.pose)[:, :2]
+        return rms(np.hypot(*error.T))
+
+
+def rms(values: Floats) -> float:
+    """Root mean square; NaN of nothing."""
+    return float(np.sqrt(np.square(values).mean())) if len(values) else float("nan")
+
+
+class Vehicle:
+    """Hull and sensors of a run, which answer the chip's lines.
+
+    The world moves one period per sample; a command acts from the moment that it comes, as long
+    after the sample's request as the line and the chip have taken.
+
+    Parameters
+    ----------
+    plan : Mission
+        Of :func:`chip_mission`.
+    run : int
+        Its number; the seed is the mission's.
+    disturb : callable, optional
+        Given the number of a sample and its lines, what is sent instead: pairs of delay (s) and
+        text.
+
+    Attributes
+    ----------
+    sent : dict of int to list of (float, str)
+        Delay and text of what was sent in answer to each sample.
+    commands : dict of int to tuple
+        Of each sample.
+    poses : dict of int to ndarray
+        True pose at each sample.
+    delays_s : list of float
+        From request to command.
+    """
+
+    def __init__(
+        self,
+        plan: Mission,
+        run: int = 0,
+        disturb: Callable[[int, list[str]], list[tuple[float, str]]] | None = None,
+    ) -> None:
+        self.world = new_world(plan, run)
+        self.sent: dict[int, list[tuple[float, str]]] = {}
+        self.commands: dict[int, tuple[float, float, float]] = {}
+        self.poses: dict[int, Floats] = {}
+        self.delays_s: list[float] = []
+        self._disturb = disturb
+        self._asked: list[int] = []
+        self._sample = 0
+        self._requested_s = 0.0
+        self._held = _FROM_REST
+        self._next: tuple[float, tuple[float, float, float]] | None = None
+
+    def hear(self, line: str, time_s: float) -> list[tuple[float, str]]:
+        """Take a line that ended at this time; what is answered, each with its delay, s."""
+        if mission_line.is_ready(line):
+            return [(0.0, mission_line.start(*self.world.guess_m, self.world.heading_rad))]
+        request = mission_line.request(line)
+        if request is not None:
+            return self._answer(request, time_s)
+        command = mission_line.command(line)
+        if command is not None and command.sample == self._sample:
+            delay = time_s - self._requested_s
+            self.delays_s.append(delay)
+            self._next = (min(max(delay, 0.0), PERIOD_S), command.values)
+            self.commands[command.sample] = command.values
+        return []
+
+    def _answer(self, request: mission_line.Request, time_s: float) -> list[tuple[float, str]]:
+        if self._sample:
+            self._advance()
+        self._sample, self._requested_s = request.sample, time_s
+        self.poses[request.sample] = self.world.pose
+        lines = sense(self.world, request.sample, request.ping, self._asked)
+        answers = [(0.0, line) for line in lines]
+        if self._disturb is not None:
+            answers = self._disturb(request.sample, lines)
+        self.sent[request.sample] = answers
+        return answers
+
+    def _advance(self) -> None:
+        """Move on by a period: with the command before, then with the one that has come."""
+        end = self._sample * PERIOD_S
+        delay, command = self._next or (PERIOD_S, self._held)
+        if delay > 0:
+            self.world.advance(self._held, delay, end - PERIOD_S + delay)
+        self._held, self._next = command, None
+        if delay < PERIOD_S:
+            self.world.advance(command, PERIOD_S - delay, end)
+
+
+def new_world(plan: Mission, run: int) -> _core.MissionWorld:
+    """Set up hull, current and sensors of a run, as ``simulate`` does."""
+    return _core.MissionWorld(mission.core_scenario(plan), plan.seed, run)
+
+
+def sense(world: _core.MissionWorld, sample: int, ping: bool, asked: list[int]) -> list[str]:
+    """Write what the sensors have at a sample: first fixes that have arrived, then the readings.
+
+    Sample 1 is at time 0. ``asked`` has the samples that asked for a fix, and is kept up.
+    """
+    if ping:
+        world.ask()
+        asked.append(sample)
+    lines = []
+    for range_m, bearing_rad, valid_s in world.take_fixes():
+        by = max(k for k in asked if (k - 1) * PERIOD_S <= valid_s + 1e-9)
+        delay_s = max(0.0, valid_s - (by - 1) * PERIOD_S)
+        lines.append(mission_line.fix(by, range_m, bearing_rad, delay_s))
+    return lines + mission_line.readings(sample, world.sense())
+
+
+def age_of(fix: mission_line.Fix, sample: int) -> np.float32:
+    """Age of a fix at a sample, as the sketch computes it."""
+    age = np.float32(sample - fix.sample) * np.float32(PERIOD_S) - fix.delay_s
+    return age if age > 0 else np.float32(0)
+
+
+@dataclass
+class ChipTwin:
+    """The sketch's pilot on the desk, fed lines as the sketch is."""
+
+    pilot: _core.Pilot_float32
+    listener: mission_line.Listener = field(default_factory=mission_line.Listener)
+    sample: int = 0
+
+    def start(self, line: str) -> None:
+        """Take the line that says where the vehicle begins."""
+        self.listener.take(line)
+        assert self.listener.start is not None
+        self.pilot.start(*self.listener.start)
+
+    def step(self, lines: list[str]) -> tuple[float, ...]:
+        """Take the lines of the next sample and give the command."""
+        self.sample += 1
+        self.listener.begin(self.sample)
+        if self.pilot.wants_fix():
+            self.pilot.asked()
+        for line in lines:
+            self.listener.take(line)
+        self.pilot.predict(self.listener.values, self.listener.heard, np.float32(PERIOD_S))
+        for fix in self.listener.fixes:
+            self.pilot.update(*fix.z, age_of(fix, self.sample))
+        self.listener.fixes.clear()
+        return tuple(self.pilot.steer()[1:])
+
+
+def fly_on_desk(plan: Mission, run: int = 0, *, rounded: bool, delay_s: float) -> Flight:
+    """Fly a run with the chip's pilot here.
+
+    Parameters
+    ----------
+    plan : Mission
+        Of :func:`chip_mission`.
+    run : int
+        Its number.
+    rounded : bool
+        Whether readings are rounded to the digits of the line's text.
+    delay_s : float
+        From a sample to the moment at which its command acts.
+
+    Returns
+    -------
+    Flight
+        With neither, that of ``simulate``, to the bit.
+    """
+    world, pilot, flight = new_world(plan, run), new_pilot(plan), Flight()
+    twin = ChipTwin(pilot)
+    asked: list[int] = []
+    if rounded:
+        twin.start(mission_line.start(*world.guess_m, world.heading_rad))
+    else:
+        pilot.start(*world.guess_m, world.heading_rad)
+    held: tuple[float, ...] = _FROM_REST
+    for sample in range(1, int(plan.most_s / PERIOD_S) + 1):
+        if rounded:
+            command = twin.step(sense(world, sample, pilot.wants_fix(), asked))
+        else:
+            ping = pilot.wants_fix()
+            pilot.predict(world.sense().astype(np.float32), mission_line.ALL_HEARD, PERIOD_S)
+            if ping:
+                pilot.asked()
+                world.ask()
+            for range_m, bearing_rad, valid_s in world.take_fixes():
+                pilot.update(range_m, bearing_rad, world.time_s - valid_s)
+            command = tuple(pilot.steer()[1:])
+        if pilot.mode == PilotMode.finished:
+            flight.finished = True
+            break
+        x, y = pilot.x[:2]
+        flight.add(world.pose, command, float(x), float(y), pilot.leg)
+        end = sample * PERIOD_S
+        if delay_s > 0:
+            world.advance(held, delay_s, end - PERIOD_S + delay_s)
+        world.advance(command, PERIOD_S - delay_s, end)
+        held = command
+    return flight
+
+
+@dataclass
+class ChipFlight:
+    """A run of the chip: what it reported, what the vehicle did, what the simulator counted.
+
+    Attributes
+    ----------
+    vehicle : Vehicle
+        That it steered.
+    rows : list of dict
+        Its samples.
+    comments : list of str
+        What else it said.
+    damaged : int
+        Lines from the chip that could not be read.
+    awake_share : float
+        NaN for a real board.
+    stack_bytes : int
+        Deepest stack; 0 for a real board.
+    serial_overruns : int
+        Bytes that the chip lost.
+    """
+
+    vehicle: Vehicle
+    rows: list[Row] = field(default_factory=list)
+    comments: list[str] = field(default_factory=list)
+    damaged: int = 0
+    awake_share: float = float("nan")
+    stack_bytes: int = 0
+    serial_overruns: int = 0
+    reader: Reader = field(default_factory=lambda: Reader("MISSION"))
+
+    def hear(self, line: str, time_s: float) -> list[tuple[float, str]]:
+        """Take a line; what the vehicle answers."""
+        answers = self.vehicle.hear(line, time_s)
+        try:
+            row = self.reader.read(line)
+        except LineError:
+            self.damaged += 1
+            return answers
+        if row is not None:
+            self.rows.append(row)
+        elif line.startswith("#"):
+            self.comments.append(line)
+        return answers
+
+    @property
+    def over(self) -> bool:
+        """Whether the plan is at its end."""
+        return bool(self.rows) and self.rows[-1]["mode"] == int(PilotMode.finished)
+
+    @property
+    def flight(self) -> Flight:
+        """The samples under way."""
+        flight = Flight(finished=self.over)
+        for row in self.rows:
+            sample = int(row["sample"])
+            if row["mode"] == int(PilotMode.under_way) and sample in self.vehicle.commands:
+                pose, command = self.vehicle.poses[sample], self.vehicle.commands[sample]
+                flight.add(pose, command, row["x_m"], row["y_m"], int(row["leg"]))
+        return flight
+
+
+def fly_simulated(
+    elf: str | os.PathLike[str],
+    vehicle: Vehicle,
+    *,
+    samples: int | None = None,
+    runner: str | os.PathLike[str] | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> ChipFlight:
+    """Fly a run with the sketch on the simulated board, to the end of its plan.
+
+    Parameters
+    ----------
+    elf : path
+        The compiled sketch.
+    vehicle : Vehicle
+        That it steers.
+    samples : int, optional
+        Where to stop before.
+    runner : path, optional
+        The program ``auvest-board``.
+    progress : callable
+        Called with the number of samples.
+
+    Raises
+    ------
+    BoardError
+        If the sketch does what no chip should do.
+    FileNotFoundError
+        If the simulator is not there.
+    """
+    chip = ChipFlight(vehicle)
+    with Board(elf, runner=runner, limit_s=2000.0) as board:
+        for event in board:
+            if isinstance(event, SerialLine):
+                known = len(chip.rows)
+                for delay_s, text in chip.hear(event.text, event.time_s):
+                    board.send(text, delay_s)
+                if len(chip.rows) > known:
+                    if progress is not None:
+                        progress(len(chip.rows))
+                    if len(chip.rows) == samples:
+                        break
+            if isinstance(event, Finished) or (samples is None and chip.over):
+                break
+    report = board.report
+    chip.awake_share, chip.stack_bytes = report.awake_share, report.stack_bytes
+    chip.serial_overruns = report.serial_overruns
+    return chip
