@@ -35,6 +35,10 @@ COMMANDS: Mapping[tuple[str, ...], tuple[str, str]] = {
         "commands.import_log",
         "Turn a published recording into logs for 'auvest replay'.",
     ),
+    ("mission",): (
+        "commands.mission",
+        "Play the vehicle that the sketch mission steers, on a board or simulated.",
+    ),
     ("replay",): ("commands.replay", "Replay recorded runs through a filter."),
     ("simulate", "aukf"): (
         "commands.simulate_aukf",
@@ -125,6 +129,8 @@ First steps:
   auvest cost my_models.hpp          what your models take on the chip, and their bits there
 
   auvest capture --help              record what a board reports, real or simulated
+
+  auvest mission --help              the vehicle in the loop of a board that steers it
 
 {EXIT_CODES}
 """,

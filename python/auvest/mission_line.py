@@ -142,6 +142,10 @@ class Listener:
         """Begin a sample: what comes from here on belongs to it."""
         self._sample, self.heard = sample, 0
 
+    def close(self) -> None:
+        """End a sample: readings that come from here on are too late."""
+        self.heard = ALL_HEARD
+
     def take(self, line: str) -> bool:
         """Take a line; False if it is of no use."""
         try:

@@ -9,7 +9,7 @@ line adds: numbers rounded to the digits of the text, a command that comes later
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -24,11 +24,18 @@ from auvest.simulation.mission import Mission
 from auvest.telemetry import LineError, Reader, Row
 
 Floats = npt.NDArray[np.float64]
+#: Rudder and stern planes, rad; propeller, rev/s.
+Steering = tuple[float, ...]
+
+#: Given the number of a sample and its lines: what is sent instead, with delays, s.
+Disturb = Callable[[int, list[str]], list[tuple[float, str]]]
 
 PERIOD_S = 0.1
 #: From a sample to the command, s, on a line of 115,200 baud: readings, computing, command.
-DELAY_S = 0.02
-_OFF = (0.0, 0.0, 0.0)
+DELAY_S = 0.018
+#: What is answered later than this misses its sample: the sketch waits for 40 ms, and a line takes
+#: some of them.
+TIMEOUT_S = 0.03
 _FROM_REST = (0.0, 0.0, 15.0)
 
 
@@ -90,6 +97,8 @@ class Flight:
 
     Attributes
     ----------
+    sample : list of int
+        Its number; sample 1 is at time 0.
     pose : list of ndarray, shape (6,)
         North, east, down, m; roll, pitch, yaw, rad.
     command : list of (float, float, float)
@@ -102,18 +111,21 @@ class Flight:
         The plan was flown to its end.
     """
 
+    sample: list[int] = field(default_factory=list)
     pose: list[Floats] = field(default_factory=list)
-    command: list[tuple[float, ...]] = field(default_factory=list)
+    command: list[Steering] = field(default_factory=list)
     estimate_m: list[tuple[float, float]] = field(default_factory=list)
     leg: list[int] = field(default_factory=list)
     finished: bool = False
 
-    def add(self, pose: Floats, command: tuple[float, ...], x: float, y: float, leg: int) -> None:
-        """Add a sample."""
+    def add(self, sample: int, pose: Floats, command: Steering, pilot: _core.Pilot_float32) -> None:
+        """Add a sample as it is after its command."""
+        x, y = map(float, pilot.x[:2])
+        self.sample.append(sample)
         self.pose.append(pose)
         self.command.append(command)
         self.estimate_m.append((x, y))
-        self.leg.append(leg)
+        self.leg.append(pilot.leg)
 
     def beside(self) -> tuple[Floats, Floats]:
         """Along-track and cross-track of the vehicle on its leg, m."""
@@ -130,9 +142,9 @@ class Flight:
         """Cross-track error, root mean square, corners too."""
         return rms(self.beside()[1])
 
-    def settled_rms_m(self, settled_m: float = 50.0) -> float:
-        """Cross-track error from so far into a leg, root mean square."""
-        along, cross = self.beside()
+    def settled_rms_m(self, *, settled_m: float = 50.0, count: int | None = None) -> float:
+        """Cross-track error from so far into a leg, root mean square, of the first samples."""
+        along, cross = (values[:count] for values in self.beside())
         return rms(cross[along >= settled_m])
 
     @property
@@ -145,111 +157,6 @@ class Flight:
 def rms(values: Floats) -> float:
     """Root mean square; NaN of nothing."""
     return float(np.sqrt(np.square(values).mean())) if len(values) else float("nan")
-
-
-class Vehicle:
-    """Hull and sensors of a run, which answer the chip's lines.
-
-    The world moves one period per sample; a command acts from the moment that it comes, as long
-    after the sample's request as the line and the chip have taken.
-
-    Parameters
-    ----------
-    plan : Mission
-        Of :func:`chip_mission`.
-    run : int
-        Its number; the seed is the mission's.
-    disturb : callable, optional
-        Given the number of a sample and its lines, what is sent instead: pairs of delay (s) and
-        text.
-
-    Attributes
-    ----------
-    sent : dict of int to list of (float, str)
-        Delay and text of what was sent in answer to each sample.
-    commands : dict of int to tuple
-        Of each sample.
-    poses : dict of int to ndarray
-        True pose at each sample.
-    delays_s : list of float
-        From request to command.
-    """
-
-    def __init__(
-        self,
-        plan: Mission,
-        run: int = 0,
-        disturb: Callable[[int, list[str]], list[tuple[float, str]]] | None = None,
-    ) -> None:
-        self.world = new_world(plan, run)
-        self.sent: dict[int, list[tuple[float, str]]] = {}
-        self.commands: dict[int, tuple[float, float, float]] = {}
-        self.poses: dict[int, Floats] = {}
-        self.delays_s: list[float] = []
-        self._disturb = disturb
-        self._asked: list[int] = []
-        self._sample = 0
-        self._requested_s = 0.0
-        self._held = _FROM_REST
-        self._next: tuple[float, tuple[float, float, float]] | None = None
-
-    def hear(self, line: str, time_s: float) -> list[tuple[float, str]]:
-        """Take a line that ended at this time; what is answered, each with its delay, s."""
-        if mission_line.is_ready(line):
-            return [(0.0, mission_line.start(*self.world.guess_m, self.world.heading_rad))]
-        request = mission_line.request(line)
-        if request is not None:
-            return self._answer(request, time_s)
-        command = mission_line.command(line)
-        if command is not None and command.sample == self._sample:
-            delay = time_s - self._requested_s
-            self.delays_s.append(delay)
-            self._next = (min(max(delay, 0.0), PERIOD_S), command.values)
-            self.commands[command.sample] = command.values
-        return []
-
-    def _answer(self, request: mission_line.Request, time_s: float) -> list[tuple[float, str]]:
-        if self._sample:
-            self._advance()
-        self._sample, self._requested_s = request.sample, time_s
-        self.poses[request.sample] = self.world.pose
-        lines = sense(self.world, request.sample, request.ping, self._asked)
-        answers = [(0.0, line) for line in lines]
-        if self._disturb is not None:
-            answers = self._disturb(request.sample, lines)
-        self.sent[request.sample] = answers
-        return answers
-
-    def _advance(self) -> None:
-        """Move on by a period: with the command before, then with the one that has come."""
-        end = self._sample * PERIOD_S
-        delay, command = self._next or (PERIOD_S, self._held)
-        if delay > 0:
-            self.world.advance(self._held, delay, end - PERIOD_S + delay)
-        self._held, self._next = command, None
-        if delay < PERIOD_S:
-            self.world.advance(command, PERIOD_S - delay, end)
-
-
-def new_world(plan: Mission, run: int) -> _core.MissionWorld:
-    """Set up hull, current and sensors of a run, as ``simulate`` does."""
-    return _core.MissionWorld(mission.core_scenario(plan), plan.seed, run)
-
-
-def sense(world: _core.MissionWorld, sample: int, ping: bool, asked: list[int]) -> list[str]:
-    """Write what the sensors have at a sample: first fixes that have arrived, then the readings.
-
-    Sample 1 is at time 0. ``asked`` has the samples that asked for a fix, and is kept up.
-    """
-    if ping:
-        world.ask()
-        asked.append(sample)
-    lines = []
-    for range_m, bearing_rad, valid_s in world.take_fixes():
-        by = max(k for k in asked if (k - 1) * PERIOD_S <= valid_s + 1e-9)
-        delay_s = max(0.0, valid_s - (by - 1) * PERIOD_S)
-        lines.append(mission_line.fix(by, range_m, bearing_rad, delay_s))
-    return lines + mission_line.readings(sample, world.sense())
 
 
 def age_of(fix: mission_line.Fix, sample: int) -> np.float32:
@@ -272,19 +179,157 @@ class ChipTwin:
         assert self.listener.start is not None
         self.pilot.start(*self.listener.start)
 
-    def step(self, lines: list[str]) -> tuple[float, ...]:
-        """Take the lines of the next sample and give the command."""
+    def step(self, lines: Sequence[str], late: Sequence[str] = ()) -> Steering:
+        """Take the lines of the next sample, and those that come behind it; give the command."""
         self.sample += 1
         self.listener.begin(self.sample)
         if self.pilot.wants_fix():
             self.pilot.asked()
         for line in lines:
             self.listener.take(line)
-        self.pilot.predict(self.listener.values, self.listener.heard, np.float32(PERIOD_S))
+        self.pilot.predict(self.listener.values, self.listener.heard, PERIOD_S)
         for fix in self.listener.fixes:
             self.pilot.update(*fix.z, age_of(fix, self.sample))
         self.listener.fixes.clear()
-        return tuple(self.pilot.steer()[1:])
+        _, *command = self.pilot.steer()
+        self.listener.close()
+        for line in late:
+            self.listener.take(line)
+        return tuple(command)
+
+
+class VehicleError(RuntimeError):
+    """The chip is not at the sample that the vehicle is at."""
+
+
+class Vehicle:
+    """Hull and sensors of a run, which answer the chip's lines.
+
+    The world moves one period per sample; a command acts from the moment that it comes, as long
+    after the sample's request as the line and the chip have taken.
+
+    Parameters
+    ----------
+    plan : Mission
+        Of :func:`chip_mission`.
+    run : int
+        Its number; the seed is the mission's.
+    disturb : Disturb, optional
+        Given the number of a sample and its lines, what is sent instead: pairs of delay (s) and
+        text.
+
+    Attributes
+    ----------
+    twin : ChipTwin
+        The chip's pilot on the desk, fed the same lines: where the chip takes itself to be.
+    flight : Flight
+        The samples under way.
+    differing : int
+        Commands of the chip that are not the twin's, to the bit.
+    delays_s : list of float
+        From each request to its command.
+    """
+
+    def __init__(self, plan: Mission, run: int = 0, disturb: Disturb | None = None) -> None:
+        self.twin = ChipTwin(new_pilot(plan))
+        self.flight = Flight()
+        self.differing = 0
+        self.delays_s: list[float] = []
+        self._world = new_world(plan, run)
+        self._disturb = disturb
+        self._asked: list[int] = []
+        self._sample = 0
+        self._requested_s = 0.0
+        self._answers: list[tuple[float, str]] = []
+        self._held: Steering = _FROM_REST
+        self._command: Steering | None = None
+
+    def hear(self, line: str, time_s: float) -> list[tuple[float, str]]:
+        """Take a line that ended at this time; what is answered, each with its delay, s.
+
+        Raises
+        ------
+        VehicleError
+            If the chip begins anew, or has begun without this vehicle.
+        """
+        if mission_line.is_ready(line):
+            if self.twin.sample:
+                raise VehicleError("the board has begun anew: it was reset")
+            answer = mission_line.start(*self._world.guess_m, self._world.heading_rad)
+            if self.twin.listener.start is None:
+                self.twin.start(answer)
+            return [(0.0, answer)]
+        request = mission_line.request(line)
+        if request is not None:
+            return self._answer(request, time_s)
+        command = mission_line.command(line)
+        if command is not None and command.sample == self._sample:
+            self._command = command.values
+            self.delays_s.append(time_s - self._requested_s)
+        return []
+
+    def _answer(self, request: mission_line.Request, time_s: float) -> list[tuple[float, str]]:
+        self.finish()
+        if request.sample != self.twin.sample + 1:
+            raise VehicleError(
+                f"the board asks for sample {request.sample}, but {self.twin.sample + 1} is due: "
+                "reset it, and look at the line"
+            )
+        self._sample, self._requested_s = request.sample, time_s
+        lines = sense(self._world, request.sample, request.ping, self._asked)
+        self._answers = [(0.0, line) for line in lines]
+        if self._disturb is not None:
+            self._answers = self._disturb(request.sample, lines)
+        return self._answers
+
+    def finish(self) -> None:
+        """End the sample that is under way: the world moves on by a period."""
+        if not self._sample:
+            return
+        twin = self.twin
+        in_time = [text for delay_s, text in self._answers if delay_s < TIMEOUT_S]
+        wanted = twin.step(in_time, [text for d, text in self._answers if d >= TIMEOUT_S])
+        self.flight.finished = twin.pilot.mode == PilotMode.finished
+        delay_s, command = PERIOD_S, self._held  # a command that is lost: the one before goes on
+        if self._command is not None:
+            self.differing += _bits(self._command) != _bits(wanted)
+            delay_s = min(max(self.delays_s[-1], 0.0), PERIOD_S)
+            command = self._command
+        if twin.pilot.mode == PilotMode.under_way:
+            self.flight.add(self._sample, self._world.pose, command, twin.pilot)
+        end_s = self._sample * PERIOD_S
+        for held, span_s, until_s in (
+            (self._held, delay_s, end_s - PERIOD_S + delay_s),
+            (command, PERIOD_S - delay_s, end_s),
+        ):
+            if span_s > 0:
+                self._world.advance(held, span_s, until_s)
+        self._held, self._command, self._sample = command, None, 0
+
+
+def _bits(command: Steering) -> bytes:
+    return np.float32(command).tobytes()
+
+
+def new_world(plan: Mission, run: int) -> _core.MissionWorld:
+    """Set up hull, current and sensors of a run, as ``simulate`` does."""
+    return _core.MissionWorld(mission.core_scenario(plan), plan.seed, run)
+
+
+def sense(world: _core.MissionWorld, sample: int, ping: bool, asked: list[int]) -> list[str]:
+    """Write what the sensors have at a sample: first fixes that have arrived, then the readings.
+
+    Sample 1 is at time 0. ``asked`` has the samples that asked for a fix, and is kept up.
+    """
+    if ping:
+        world.ask()
+        asked.append(sample)
+    lines = []
+    for range_m, bearing_rad, valid_s in world.take_fixes():
+        by = max(k for k in asked if (k - 1) * PERIOD_S <= valid_s + 1e-9)
+        delay_s = max(0.0, valid_s - (by - 1) * PERIOD_S)
+        lines.append(mission_line.fix(by, range_m, bearing_rad, delay_s))
+    return lines + mission_line.readings(sample, world.sense())
 
 
 def fly_on_desk(plan: Mission, run: int = 0, *, rounded: bool, delay_s: float) -> Flight:
@@ -313,7 +358,7 @@ def fly_on_desk(plan: Mission, run: int = 0, *, rounded: bool, delay_s: float) -
         twin.start(mission_line.start(*world.guess_m, world.heading_rad))
     else:
         pilot.start(*world.guess_m, world.heading_rad)
-    held: tuple[float, ...] = _FROM_REST
+    held: Steering = _FROM_REST
     for sample in range(1, int(plan.most_s / PERIOD_S) + 1):
         if rounded:
             command = twin.step(sense(world, sample, pilot.wants_fix(), asked))
@@ -329,8 +374,7 @@ def fly_on_desk(plan: Mission, run: int = 0, *, rounded: bool, delay_s: float) -
         if pilot.mode == PilotMode.finished:
             flight.finished = True
             break
-        x, y = pilot.x[:2]
-        flight.add(world.pose, command, float(x), float(y), pilot.leg)
+        flight.add(sample, world.pose, command, pilot)
         end = sample * PERIOD_S
         if delay_s > 0:
             world.advance(held, delay_s, end - PERIOD_S + delay_s)
@@ -384,45 +428,37 @@ class ChipFlight:
             self.comments.append(line)
         return answers
 
-    @property
-    def over(self) -> bool:
-        """Whether the plan is at its end."""
-        return bool(self.rows) and self.rows[-1]["mode"] == int(PilotMode.finished)
-
-    @property
-    def flight(self) -> Flight:
-        """The samples under way."""
-        flight = Flight(finished=self.over)
-        for row in self.rows:
-            sample = int(row["sample"])
-            if row["mode"] == int(PilotMode.under_way) and sample in self.vehicle.commands:
-                pose, command = self.vehicle.poses[sample], self.vehicle.commands[sample]
-                flight.add(pose, command, row["x_m"], row["y_m"], int(row["leg"]))
-        return flight
+    def over(self, samples: int | None) -> bool:
+        """Whether the plan, or the number of samples, is at its end and has been reported."""
+        if not self.rows:
+            return False
+        last = self.rows[-1]
+        enough = samples is not None and self.vehicle.twin.sample >= samples
+        return enough or last["mode"] == int(PilotMode.finished)
 
 
 def fly_simulated(
     elf: str | os.PathLike[str],
-    vehicle: Vehicle,
+    chip: ChipFlight,
     *,
     samples: int | None = None,
     runner: str | os.PathLike[str] | None = None,
-    progress: Callable[[int], None] | None = None,
-) -> ChipFlight:
+    progress: Callable[[], None] | None = None,
+) -> None:
     """Fly a run with the sketch on the simulated board, to the end of its plan.
 
     Parameters
     ----------
     elf : path
         The compiled sketch.
-    vehicle : Vehicle
-        That it steers.
+    chip : ChipFlight
+        Takes what it does.
     samples : int, optional
         Where to stop before.
     runner : path, optional
         The program ``auvest-board``.
-    progress : callable
-        Called with the number of samples.
+    progress : callable, optional
+        Called now and then.
 
     Raises
     ------
@@ -431,21 +467,16 @@ def fly_simulated(
     FileNotFoundError
         If the simulator is not there.
     """
-    chip = ChipFlight(vehicle)
     with Board(elf, runner=runner, limit_s=2000.0) as board:
         for event in board:
             if isinstance(event, SerialLine):
                 known = len(chip.rows)
                 for delay_s, text in chip.hear(event.text, event.time_s):
                     board.send(text, delay_s)
-                if len(chip.rows) > known:
-                    if progress is not None:
-                        progress(len(chip.rows))
-                    if len(chip.rows) == samples:
-                        break
-            if isinstance(event, Finished) or (samples is None and chip.over):
+                if progress is not None and len(chip.rows) > known:
+                    progress()
+            if isinstance(event, Finished) or chip.over(samples):
                 break
-    report = board.report
-    chip.awake_share, chip.stack_bytes = report.awake_share, report.stack_bytes
-    chip.serial_overruns = report.serial_overruns
-    return chip
+    chip.vehicle.finish()
+    chip.awake_share, chip.stack_bytes = board.report.awake_share, board.report.stack_bytes
+    chip.serial_overruns = board.report.serial_overruns

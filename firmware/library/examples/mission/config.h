@@ -37,6 +37,9 @@ constexpr float kHold = 1;
 constexpr float kCompassHold = 30;
 constexpr float kLost = 20;
 
+/// Samples per line of telemetry. Each costs 5 ms awake.
+constexpr uint32_t kSamplesPerLine = 5;
+
 /// RAM that is kept for the stack and for what Arduino itself takes, bytes. The sketch prints what
 /// it has left unused.
 constexpr size_t kStackReserve = 2048;

@@ -105,9 +105,9 @@ AUVEST_OUTLINE void report() {
   sample.refused = vehicle.refused();
   sample.awake = wake_timer::take_awake();
   telemetry.write(sample, pilot);
-  if (sample.number % 600 == 0) {
+  if (sample.number % (120 * kSamplesPerLine) == 0 && !wake_timer::reached(deadline - kPause)) {
     telemetry.line().send();
-    if (!wake_timer::reached(deadline - kPause)) Telemetry::remark_ram(auvest_board::ram_unused());
+    Telemetry::remark_ram(auvest_board::ram_unused());
   }
 }
 
@@ -148,12 +148,12 @@ void loop() {
                 telemetry.line());
 
   // The pilot.
-  const auto& readings = vehicle.readings();
-  sample.heard = readings.heard;
+  sample.heard = vehicle.readings().heard;
   sample.time.add(moment - previous);
   sample.dt = late ? wake_timer::to_seconds(moment - previous) : kPeriod;
   sample.status = auvest::Status::kOk;
-  note(pilot.predict(readings, sample.dt));
+  note(pilot.predict(vehicle.readings(), sample.dt));
+  vehicle.close();
   update();
   steer();
 
@@ -162,5 +162,5 @@ void loop() {
     if (!(sample.heard & bit)) ++sample.missed;
   }
   if (late) ++sample.late;
-  report();
+  if (sample.number % kSamplesPerLine == 0) report();
 }

@@ -58,6 +58,9 @@ class MissionLine {
     readings_.heard = 0;
   }
 
+  /// Readings that come from here on are too late.
+  void close() { readings_.heard = kAllHeard; }
+
   void announce() {
     auvest_board::LineOut<16> line;
     line.start("READY");

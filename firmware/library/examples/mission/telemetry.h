@@ -1,4 +1,4 @@
-// One line of text per sample, and the comment that names its columns.
+// A line of text about a sample, and the comment that names its columns.
 //
 // auvest reads it back in python/auvest/telemetry.py.
 #pragma once
@@ -14,7 +14,7 @@ struct Sample {
   auvest_board::wake_timer::Elapsed time;       ///< of the sample, since the start
   float dt = 0;                                 ///< predicted over [s]
   uint8_t heard = 0;                            ///< PilotSensor bits
-  uint8_t fixes = 0;                            ///< taken by the filter
+  uint8_t fixes = 0;                            ///< taken by the filter in this sample
   float nis = 0;                                ///< of the last of them
   auvest::Status status = auvest::Status::kOk;  ///< the first that is not kOk
   uint32_t missed = 0;                          ///< readings that did not come
