@@ -205,12 +205,13 @@ void bind_pilot(py::module_& m) {
   py::class_<PilotHandle>(m, "Pilot_float32")
       .def(py::init<const Array<float>&, const py::dict&, float>(), py::arg("plan"),
            py::arg("settings"), py::arg("interval_s"))
-      .def("start", &PilotHandle::start)
+      .def("start", &PilotHandle::start, py::arg("x_m"), py::arg("y_m"), py::arg("heading_rad"))
       .def("wants_fix", &PilotHandle::wants_fix)
       .def("asked", &PilotHandle::asked)
       .def("predict", &PilotHandle::predict, py::arg("values").noconvert(), py::arg("heard"),
            py::arg("dt"))
-      .def("update", &PilotHandle::update)
+      .def("update", &PilotHandle::update, py::arg("range_m"), py::arg("bearing_rad"),
+           py::arg("age_s"))
       .def("steer", &PilotHandle::steer)
       .def_property_readonly("mode", [](const PilotHandle& h) { return h.pilot().mode(); })
       .def_property_readonly("leg", [](const PilotHandle& h) { return h.pilot().path().leg(); })

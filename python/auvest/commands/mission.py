@@ -126,8 +126,9 @@ def command(
             runs=runs,
             seed=seed,
         )
-    settings = {"source": str(simulator or port), "duration_s": duration}
-    session = Session(terminal, output, "mission", {**settings, **mission.settings(plan)})
+    source = str(simulator or port)
+    settings = {"source": source, "duration_s": duration, **mission.settings(plan)}
+    session = Session(terminal, output, "mission", settings)
     samples = None if duration is None else max(1, round(duration / PERIOD_S))
     flights = [ChipFlight(Vehicle(plan, run)) for run in range(runs)]
     expected = samples or round(mission.simulate(plan, record=False).duration_s.mean() / PERIOD_S)
@@ -157,8 +158,8 @@ def command(
         files = {"samples": write_csv(output / "samples.csv", _samples(flights[0]))}
         files["runs"] = write_csv(output / "runs.csv", beside)
         if not no_figure:
-            files["figure"] = _draw(output / "figure.png", flights[0], settings["source"])
-    session.report(values, files, _table(values, settings["source"]))
+            files["figure"] = _draw(output / "figure.png", flights[0], source)
+    session.report(values, files, _table(values, source))
     if len(flights) > 1:
         terminal.result(_runs_table(beside))
     lost = f"{session.trouble}; the samples until then are kept" if session.trouble else ""
@@ -229,9 +230,9 @@ def compare(plan: Mission, flights: list[ChipFlight]) -> dict[str, Floats]:
 
     Runs that were not flown to the end are compared as far as they went.
     """
-    rows = []
-    for run, chip in enumerate(flights):
-        flown = chip.vehicle.flight
+    rows: list[tuple[float, ...]] = []
+    for chip in flights:
+        run, flown = chip.vehicle.run, chip.vehicle.flight
         count = len(flown.pose)
         desk, rounded, delayed = (
             fly_on_desk(plan, run, rounded=rounded, delay_s=delay_s).settled_rms_m(count=count)
@@ -241,8 +242,15 @@ def compare(plan: Mission, flights: list[ChipFlight]) -> dict[str, Floats]:
         rows.append(
             (run, settled, desk, settled - desk, rounded - desk, delayed - desk, flown.all_rms_m)
         )
-    names = ("run", "settled_rms_m", "desk_settled_rms_m", "difference_m")
-    names += ("by_rounding_m", "by_delay_m", "all_rms_m")
+    names = (
+        "run",
+        "settled_rms_m",
+        "desk_settled_rms_m",
+        "difference_m",
+        "by_rounding_m",
+        "by_delay_m",
+        "all_rms_m",
+    )
     return dict(zip(names, np.array(rows, float).T, strict=True))
 
 
@@ -344,7 +352,7 @@ def _table(values: dict[str, Any], source: str) -> Table:
 
     simulated = math.isfinite(values["awake_share_simulated"])
     share = values["awake_share_simulated" if simulated else "awake_share_by_board"]
-    rows = [
+    rows: list[tuple[str, ...]] = [
         ("cross-track RMS, settled / m", with_error("settled_rms_m"), "from 50 m into a leg"),
         ("the same without a chip / m", with_error("desk_settled_rms_m"), "same seeds, float32"),
         ("difference / m", with_error("difference_m"), "chip and line"),

@@ -11,6 +11,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -39,7 +40,7 @@ TIMEOUT_S = 0.03
 _FROM_REST = (0.0, 0.0, 15.0)
 
 
-def chip_mission(**options: object) -> Mission:
+def chip_mission(**options: Any) -> Mission:
     """Give the mission that the sketch flies as it is: its filter, guidance and track.
 
     Parameters
@@ -177,7 +178,8 @@ class ChipTwin:
         """Take the line that says where the vehicle begins."""
         self.listener.take(line)
         assert self.listener.start is not None
-        self.pilot.start(*self.listener.start)
+        x, y, heading = map(float, self.listener.start)
+        self.pilot.start(x, y, heading)
 
     def step(self, lines: Sequence[str], late: Sequence[str] = ()) -> Steering:
         """Take the lines of the next sample, and those that come behind it; give the command."""
@@ -189,7 +191,8 @@ class ChipTwin:
             self.listener.take(line)
         self.pilot.predict(self.listener.values, self.listener.heard, PERIOD_S)
         for fix in self.listener.fixes:
-            self.pilot.update(*fix.z, age_of(fix, self.sample))
+            range_m, bearing_rad = map(float, fix.z)
+            self.pilot.update(range_m, bearing_rad, float(age_of(fix, self.sample)))
         self.listener.fixes.clear()
         _, *command = self.pilot.steer()
         self.listener.close()
@@ -220,6 +223,8 @@ class Vehicle:
 
     Attributes
     ----------
+    run : int
+        Its number.
     twin : ChipTwin
         The chip's pilot on the desk, fed the same lines: where the chip takes itself to be.
     flight : Flight
@@ -231,6 +236,7 @@ class Vehicle:
     """
 
     def __init__(self, plan: Mission, run: int = 0, disturb: Disturb | None = None) -> None:
+        self.run = run
         self.twin = ChipTwin(new_pilot(plan))
         self.flight = Flight()
         self.differing = 0
@@ -255,7 +261,8 @@ class Vehicle:
         if mission_line.is_ready(line):
             if self.twin.sample:
                 raise VehicleError("the board has begun anew: it was reset")
-            answer = mission_line.start(*self._world.guess_m, self._world.heading_rad)
+            x, y = self._world.guess_m
+            answer = mission_line.start(x, y, self._world.heading_rad)
             if self.twin.listener.start is None:
                 self.twin.start(answer)
             return [(0.0, answer)]
@@ -308,7 +315,7 @@ class Vehicle:
 
 
 def _bits(command: Steering) -> bytes:
-    return np.float32(command).tobytes()
+    return np.array(command, np.float32).tobytes()
 
 
 def new_world(plan: Mission, run: int) -> _core.MissionWorld:
@@ -354,10 +361,11 @@ def fly_on_desk(plan: Mission, run: int = 0, *, rounded: bool, delay_s: float) -
     world, pilot, flight = new_world(plan, run), new_pilot(plan), Flight()
     twin = ChipTwin(pilot)
     asked: list[int] = []
+    x, y = world.guess_m
     if rounded:
-        twin.start(mission_line.start(*world.guess_m, world.heading_rad))
+        twin.start(mission_line.start(x, y, world.heading_rad))
     else:
-        pilot.start(*world.guess_m, world.heading_rad)
+        pilot.start(x, y, world.heading_rad)
     held: Steering = _FROM_REST
     for sample in range(1, int(plan.most_s / PERIOD_S) + 1):
         if rounded:
