@@ -72,8 +72,20 @@ def chip_mission(**options: Any) -> Mission:
     return mission.source("robust_model_aided", "lawnmower", dtype="float32", **options)
 
 
-def new_pilot(plan: Mission) -> _core.Pilot_float32:
-    """Compile what the sketch has in its config.h and plan.h into a pilot with its bits."""
+def new_pilot(
+    plan: Mission, corners: Floats = mission.LAWNMOWER, **changes: float
+) -> _core.Pilot_float32:
+    """Make the pilot of the sketch, with its bits.
+
+    Parameters
+    ----------
+    plan : Mission
+        Of :func:`chip_mission`.
+    corners : ndarray, shape (n, 2)
+        What the sketch has in plan.h.
+    **changes
+        What has been changed in its config.h: ``hold_s``, ``compass_s``, ``lost_m``.
+    """
     if not isinstance(plan.interval, FixedInterval):
         raise ValueError("the pilot here has a fixed interval, as the sketch has")
     settings = {
@@ -87,9 +99,9 @@ def new_pilot(plan: Mission) -> _core.Pilot_float32:
         "station_y_m": 0.0,
         "sigma_range_m": plan.usbl_noise_m,
         "sigma_bearing_rad": plan.usbl_noise_rad,
+        **changes,
     }
-    corners = mission.LAWNMOWER.astype(np.float32)
-    return _core.Pilot_float32(corners, settings, plan.interval.interval_s)
+    return _core.Pilot_float32(corners.astype(np.float32), settings, plan.interval.interval_s)
 
 
 @dataclass
@@ -220,6 +232,8 @@ class Vehicle:
     disturb : Disturb, optional
         Given the number of a sample and its lines, what is sent instead: pairs of delay (s) and
         text.
+    pilot : Pilot_float32, optional
+        The sketch's, if that is not as it comes: see :func:`new_pilot`.
 
     Attributes
     ----------
@@ -233,15 +247,25 @@ class Vehicle:
         Commands of the chip that are not the twin's, to the bit.
     delays_s : list of float
         From each request to its command.
+    start_line : str
+        What the chip is told before its first sample.
     """
 
-    def __init__(self, plan: Mission, run: int = 0, disturb: Disturb | None = None) -> None:
+    def __init__(
+        self,
+        plan: Mission,
+        run: int = 0,
+        disturb: Disturb | None = None,
+        pilot: _core.Pilot_float32 | None = None,
+    ) -> None:
         self.run = run
-        self.twin = ChipTwin(new_pilot(plan))
+        self.twin = ChipTwin(pilot or new_pilot(plan))
         self.flight = Flight()
         self.differing = 0
         self.delays_s: list[float] = []
         self._world = new_world(plan, run)
+        x, y = self._world.guess_m
+        self.start_line = mission_line.start(x, y, self._world.heading_rad)
         self._disturb = disturb
         self._asked: list[int] = []
         self._sample = 0
@@ -261,11 +285,9 @@ class Vehicle:
         if mission_line.is_ready(line):
             if self.twin.sample:
                 raise VehicleError("the board has begun anew: it was reset")
-            x, y = self._world.guess_m
-            answer = mission_line.start(x, y, self._world.heading_rad)
             if self.twin.listener.start is None:
-                self.twin.start(answer)
-            return [(0.0, answer)]
+                self.twin.start(self.start_line)
+            return [(0.0, self.start_line)]
         request = mission_line.request(line)
         if request is not None:
             return self._answer(request, time_s)
@@ -437,12 +459,10 @@ class ChipFlight:
         return answers
 
     def over(self, samples: int | None) -> bool:
-        """Whether the plan, or the number of samples, is at its end and has been reported."""
-        if not self.rows:
-            return False
-        last = self.rows[-1]
-        enough = samples is not None and self.vehicle.twin.sample >= samples
-        return enough or last["mode"] == int(PilotMode.finished)
+        """Whether so many samples are over or, without a number, the plan, and reported so."""
+        if samples is not None:
+            return self.vehicle.twin.sample >= samples
+        return bool(self.rows) and self.rows[-1]["mode"] == int(PilotMode.finished)
 
 
 def fly_simulated(
@@ -462,7 +482,7 @@ def fly_simulated(
     chip : ChipFlight
         Takes what it does.
     samples : int, optional
-        Where to stop before.
+        Where to stop instead.
     runner : path, optional
         The program ``auvest-board``.
     progress : callable, optional
