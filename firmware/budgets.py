@@ -22,13 +22,22 @@ from pathlib import Path
 
 import numpy as np
 
-from auvest import telemetry
+from auvest import mission_line, telemetry
 from auvest.board import Board, BoardError, SerialLine
 from auvest.firmware.package import PackageError, package
 from auvest.firmware.sketch import Compiled, SketchError, compile_sketch
 from auvest.scenarios import cooperative
 from auvest.scenarios.paper_aukf import FilterName, paper_filter, paper_noise
 from auvest.scenarios.tracking import Scenario, Track, simulate
+from auvest.simulation.vehicle_in_the_loop import (
+    PERIOD_S,
+    ChipFlight,
+    Vehicle,
+    chip_mission,
+    fly_simulated,
+    new_pilot,
+    new_world,
+)
 from firmware.parity.slatf import FIELDS, paper_world
 from firmware.parity.targets import AVR_PARTICLES
 
@@ -53,6 +62,7 @@ STEPS = {
     "aukf_covariance_budget": 1_000,
 }
 STEPS.update(robust_ekf_predict=1_000, robust_ekf_update=1_000)
+STEPS.update(pilot_steer=1_000, pilot_predict=1_000, pilot_update=199)  # one fix of five periods
 
 #: Echoes that SLATF is measured over, and the seconds between two of them.
 ECHOES = 25
@@ -113,8 +123,8 @@ def _filter(kind: str, arguments: str, step: str) -> tuple[str, dict[str, str]]:
     return "filter", {"FILTER": kind, "ARGUMENTS": arguments, "STEP": step}
 
 
-#: Template in SKETCHES of each program, and what stands in its places. The two programs of the
-#: range filter are one, of which the section with number 1 is reported.
+#: Template in SKETCHES of each program, and what stands in its places. The programs of the range
+#: filter are one, and those of the pilot, of which the section with number 1 is reported.
 _PROGRAMS: Mapping[str, tuple[str, Mapping[str, str]]] = {
     "empty": ("empty", {}),
     "ekf": _filter("auvest::Ekf<Process>", "Process()", _FIXED_STEP),
@@ -134,6 +144,9 @@ _PROGRAMS: Mapping[str, tuple[str, Mapping[str, str]]] = {
     ),
     "robust_ekf_predict": ("range_filter", {"PREDICT": "1", "UPDATE": "2"}),
     "robust_ekf_update": ("range_filter", {"PREDICT": "2", "UPDATE": "1"}),
+    "pilot_steer": ("pilot", {"STEER": "1", "PREDICT": "2", "UPDATE": "3"}),
+    "pilot_predict": ("pilot", {"STEER": "2", "PREDICT": "1", "UPDATE": "3"}),
+    "pilot_update": ("pilot", {"STEER": "2", "PREDICT": "3", "UPDATE": "1"}),
     "slatf1": ("slatf", {"KIND": "Slatf1", "PARTICLES": str(AVR_PARTICLES)}),
     "slatf2": ("slatf", {"KIND": "Slatf2", "PARTICLES": str(AVR_PARTICLES)}),
 }
@@ -197,6 +210,26 @@ def _range_record(steps: int) -> bytes:
     return np.concatenate([[4.0], rows.ravel(), np.full(6, np.nan)]).astype("<f4").tobytes()
 
 
+def _pilot_record() -> bytes:
+    """Start and the readings of a vehicle on its first leg and round its first corners."""
+    plan = chip_mission()
+    world, pilot = new_world(plan, 0), new_pilot(plan)
+    start = [*world.guess_m, world.heading_rad]
+    pilot.start(*start)
+    rows = []
+    for k in range(STEPS["pilot_steer"]):
+        readings, fix = world.sense().astype(np.float32), [np.nan, np.nan]
+        pilot.predict(readings, mission_line.ALL_HEARD, PERIOD_S)
+        if pilot.wants_fix():
+            pilot.asked()
+            world.ask()
+            ((*fix, _),) = world.take_fixes()
+            pilot.update(*fix, 0.0)
+        rows.append([*readings, *fix])
+        world.advance(pilot.steer()[1:], PERIOD_S, (k + 1) * PERIOD_S)
+    return np.concatenate([start, np.ravel(rows), [np.nan]]).astype("<f4").tobytes()
+
+
 # ---- Measure -------------------------------------------------------------------------------------
 
 
@@ -214,7 +247,7 @@ def measure(output: Path) -> list[Row]:
         `empty`, the filters, the examples.
     """
     library = package(output)
-    runners = {"empty": _run_empty, "slatf": _run_slatf}
+    runners = {"empty": _run_empty, "slatf": _run_slatf, "pilot": _run_pilot}
     programs: dict[str, Callable[[Compiled, Path], Row]] = {
         program: runners.get(template, _run_filter) for program, (template, _) in _PROGRAMS.items()
     }
@@ -222,6 +255,7 @@ def measure(output: Path) -> list[Row]:
     programs["replay"] = _run_replay
     programs["tracking_loop"] = _run_tracking_loop
     programs["slave_tracking"] = _run_slave_tracking
+    programs["mission"] = _run_mission
     compiled = {}
     for program in programs:  # one after the other: they share Arduino's core
         folder = output / "sketches" / program
@@ -260,6 +294,10 @@ def _run_filter(compiled: Compiled, folder: Path) -> Row:
 
 def _run_slatf(compiled: Compiled, folder: Path) -> Row:
     return _run_record(compiled, folder, _slatf_record(), ECHOES)
+
+
+def _run_pilot(compiled: Compiled, folder: Path) -> Row:
+    return _run_record(compiled, folder, _pilot_record(), STEPS[folder.name])
 
 
 def _run_record(compiled: Compiled, folder: Path, words: bytes, steps: int) -> Row:
@@ -334,6 +372,15 @@ def _run_slave_tracking(compiled: Compiled, folder: Path) -> Row:
     # The first sample counts the start too.
     pairs = np.array(awake_us[1:]).reshape(-1, 2).sum(axis=1)
     return _row(folder.name, compiled, board.report.stack_bytes, [round(16 * us) for us in pairs])
+
+
+def _run_mission(compiled: Compiled, folder: Path) -> Row:
+    """Measure 60 s of a vehicle in the loop: the cycles awake per sample, telemetry's share too."""
+    chip = ChipFlight(Vehicle(chip_mission()))
+    fly_simulated(compiled.elf, chip, samples=600)
+    samples = np.diff([row["sample"] for row in chip.rows])
+    awake_us = np.array([row["awake_us"] for row in chip.rows[1:]]) / samples
+    return _row(folder.name, compiled, chip.stack_bytes, [round(16 * us) for us in awake_us])
 
 
 # ---- Compare and write ---------------------------------------------------------------------------
@@ -420,7 +467,10 @@ def page(rows: list[Row]) -> str:
         f"{ECHOES} times at the beginning of the paper's scenario. The examples: `first_steps` is",
         "its whole run, serial text included; `replay` counts predict, update and feedback by the",
         "chip's timer; `tracking_loop` counts the cycles awake between two samples,",
-        "`slave_tracking` those between two pings, serial text included.",
+        "`slave_tracking` those between two pings, serial text included, and `mission` those per",
+        "sample of 0.1 s. Its pilot by itself, in 100 s of the same mission: `pilot_steer` is",
+        "guidance and control, `pilot_predict` heading and estimate, each twice because of late",
+        "fixes, `pilot_update` one fix.",
         "",
         "Flash and static RAM are what the IDE reports (bytes); the stack is the deepest of the",
         "whole run from the end of the RAM, interrupts included.",

@@ -20,10 +20,12 @@ Examples
 from __future__ import annotations
 
 import math
+import os
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from threading import Event
 from typing import Annotated, Any
 
 import numpy as np
@@ -175,18 +177,29 @@ def _fly_all(
     workers: int | None,
     flown: Callable[[], None],
 ) -> None:
-    with ThreadPoolExecutor(workers) as pool:
-        futures = [
-            pool.submit(fly_simulated, elf, flight, samples=samples, progress=flown)
-            for flight in flights
-        ]
+    """Fly all runs; the first failure, and Ctrl-C, ends those that are under way."""
+    ended = Event()
+
+    def go_on() -> None:
+        flown()
+        if ended.is_set():
+            raise _Ended
+
+    def fly(chip: ChipFlight) -> None:
+        if not ended.is_set():
+            fly_simulated(elf, chip, samples=samples, progress=go_on)
+
+    with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
+        futures = [pool.submit(fly, chip) for chip in flights]
         try:
             for future in futures:
                 future.result()
-        except BaseException:
-            for future in futures:
-                future.cancel()
-            raise
+        finally:
+            ended.set()
+
+
+class _Ended(RuntimeError):
+    """Another run has failed, or Ctrl-C came."""
 
 
 class _ConnectionLost(RuntimeError):
