@@ -147,7 +147,7 @@ def test_a_leg_with_the_bits_of_the_desk_and_its_cross_track(sketches, runner):
         f"command {1e3 * np.mean(vehicle.delays_s):.1f} ms after its sample"
     )
     # Readings are rounded to less than a hundredth of their noise, and a rudder that comes 20 ms
-    # late turns 0.1 deg less: 3 mm across the track, 10 m ahead.
+    # late turns 0.1 deg less: 2 cm across the track, 10 m ahead.
     assert abs(settled[0] - settled[1]) < 0.02
     assert chip.awake_share < 0.15
     assert max(vehicle.delays_s) < 0.04

@@ -33,7 +33,7 @@ Disturb = Callable[[int, list[str]], list[tuple[float, str]]]
 
 PERIOD_S = 0.1
 #: From a sample to the command, s, on a line of 115,200 baud: readings, computing, command.
-DELAY_S = 0.018
+DELAY_S = 0.02
 #: What is answered later than this misses its sample: the sketch waits for 40 ms, and a line takes
 #: some of them.
 TIMEOUT_S = 0.03

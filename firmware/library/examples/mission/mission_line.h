@@ -50,6 +50,10 @@ class MissionLine {
       auvest::kCompassHeard | auvest::kGyroHeard | auvest::kLogHeard | auvest::kDepthHeard;
   /// Fixes that may come within one period; of more, the last are refused.
   static constexpr uint8_t kFixes = 2;
+  /// Ticks for which characters are gathered, 1.5 ms, 17 of them; and how many are enough, of the
+  /// 64 for which Arduino has room.
+  static constexpr uint32_t kGather = wake_timer::to_ticks(0.0015f);
+  static constexpr int kFull = 32;
 
   /// What comes from here on belongs to a new sample. A line under way is read to its end: it may
   /// be a late fix.
@@ -94,6 +98,11 @@ class MissionLine {
   bool await(Done done, uint32_t limit, Line& line) {
     for (;;) {
       wake_timer::sleep_until([&] { return Serial.available() > 0 || line.sendable(); }, limit);
+      // To look at every character costs ten times what its interrupt does: they are gathered.
+      const uint32_t gathered = wake_timer::now() + kGather;
+      if (!wake_timer::reached(limit - kGather)) {
+        wake_timer::sleep_until([] { return Serial.available() >= kFull; }, gathered);
+      }
       line.send_some();
       while (Serial.available() > 0) {
         const auvest_board::LineIn::Result result = line_.take(static_cast<char>(Serial.read()));
