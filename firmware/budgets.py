@@ -23,13 +23,22 @@ from typing import TypeAlias
 
 import numpy as np
 
-from auvest import telemetry
+from auvest import mission_line, telemetry
 from auvest.board import Board, BoardError, SerialLine
 from auvest.firmware.package import PackageError, package
 from auvest.firmware.sketch import Compiled, SketchError, compile_sketch
 from auvest.scenarios import cooperative
 from auvest.scenarios.paper_aukf import FilterName, paper_filter, paper_noise
 from auvest.scenarios.tracking import Scenario, Track, simulate
+from auvest.simulation.vehicle_in_the_loop import (
+    PERIOD_S,
+    ChipFlight,
+    Vehicle,
+    chip_mission,
+    fly_simulated,
+    new_pilot,
+    new_world,
+)
 from firmware.parity.slatf import fields_of, paper_world
 from firmware.parity.targets import AVR_PARTICLES
 from firmware.parity.vehicle import MissionRecord, zigzag
@@ -60,6 +69,7 @@ STEPS.update(heading_filter=1_300, model_aided_predict=1_300, guidance_control=1
 STEPS.update(model_aided_update=259)
 STEPS.update(hull3_rk4=500, hull3_semi_implicit=500, hull6_rk4=500, hull6_semi_implicit=500)
 STEPS.update(rov_allocation=500, rov_thrust_inverse=500)
+STEPS.update(pilot_steer=1_000, pilot_predict=1_000, pilot_update=199)  # one fix of five periods
 
 #: Particles of SlatfJoint: whole blocks that the RAM holds beside the stack.
 JOINT_PARTICLES = 32
@@ -152,8 +162,8 @@ _MISSION_SECTIONS = {
 }
 _OTHERS = (("HEADING", "2"), ("PREDICT", "3"), ("UPDATE", "4"), ("STEER", "5"))
 
-#: The two programs of the range filter are one, of which the section with number 1 is reported; so
-#: are those of a mission and of the allocation.
+#: The programs of the range filter are one, of which the section with number 1 is reported; so are
+#: those of a mission, of the allocation and of the pilot.
 _PROGRAMS: Mapping[str, Program] = {
     "empty": ("empty", {}),
     "ekf": _filter("auvest::Ekf<Process>", "Process()", _FIXED_STEP),
@@ -184,6 +194,9 @@ _PROGRAMS: Mapping[str, Program] = {
     },
     "rov_allocation": ("allocation", {"ALLOCATE": "1", "INVERT": "2"}),
     "rov_thrust_inverse": ("allocation", {"ALLOCATE": "2", "INVERT": "1"}),
+    "pilot_steer": ("pilot", {"STEER": "1", "PREDICT": "2", "UPDATE": "3"}),
+    "pilot_predict": ("pilot", {"STEER": "2", "PREDICT": "1", "UPDATE": "3"}),
+    "pilot_update": ("pilot", {"STEER": "2", "PREDICT": "3", "UPDATE": "1"}),
     "slatf1": _slat("Slatf1", AVR_PARTICLES),
     "slatf2": _slat("Slatf2", AVR_PARTICLES),
     "slatf_joint": _slat("SlatfJoint", JOINT_PARTICLES),
@@ -267,6 +280,26 @@ def _vehicle_record(template: str) -> bytes:
     return np.append(demands, np.full((1, 6), np.nan), axis=0).astype("<f4").tobytes()
 
 
+def _pilot_record() -> bytes:
+    """Start and the readings of a vehicle on its first leg and round its first corners."""
+    plan = chip_mission()
+    world, pilot = new_world(plan, 0), new_pilot(plan)
+    start = [*world.guess_m, world.heading_rad]
+    pilot.start(*start)
+    rows = []
+    for k in range(STEPS["pilot_steer"]):
+        readings, fix = world.sense().astype(np.float32), [np.nan, np.nan]
+        pilot.predict(readings, mission_line.ALL_HEARD, PERIOD_S)
+        if pilot.wants_fix():
+            pilot.asked()
+            world.ask()
+            ((*fix, _),) = world.take_fixes()
+            pilot.update(*fix, 0.0)
+        rows.append([*readings, *fix])
+        world.advance(pilot.steer()[1:], PERIOD_S, (k + 1) * PERIOD_S)
+    return np.concatenate([start, np.ravel(rows), [np.nan]]).astype("<f4").tobytes()
+
+
 # ---- Measure -------------------------------------------------------------------------------------
 
 
@@ -284,7 +317,7 @@ def measure(output: Path) -> list[Row]:
         `empty`, the filters, the examples.
     """
     library = package(output)
-    runners = {"empty": _run_empty, "slatf": _run_slatf}
+    runners = {"empty": _run_empty, "slatf": _run_slatf, "pilot": _run_pilot}
     programs: dict[str, Callable[[Compiled, Path], Row]] = {
         program: runners.get(template, _run_filter) for program, (template, _) in _PROGRAMS.items()
     }
@@ -292,6 +325,7 @@ def measure(output: Path) -> list[Row]:
     programs["replay"] = _run_replay
     programs["tracking_loop"] = _run_tracking_loop
     programs["slave_tracking"] = _run_slave_tracking
+    programs["mission"] = _run_mission
     compiled = {}
     for program in programs:  # one after the other: they share Arduino's core
         folder = output / "sketches" / program
@@ -330,6 +364,10 @@ def _run_filter(compiled: Compiled, folder: Path) -> Row:
 
 def _run_slatf(compiled: Compiled, folder: Path) -> Row:
     return _run_record(compiled, folder, _slatf_record(), ECHOES)
+
+
+def _run_pilot(compiled: Compiled, folder: Path) -> Row:
+    return _run_record(compiled, folder, _pilot_record(), STEPS[folder.name])
 
 
 def _run_record(compiled: Compiled, folder: Path, words: bytes, steps: int) -> Row:
@@ -404,6 +442,15 @@ def _run_slave_tracking(compiled: Compiled, folder: Path) -> Row:
     # The first sample counts the start too.
     pairs = np.array(awake_us[1:]).reshape(-1, 2).sum(axis=1)
     return _row(folder.name, compiled, board.report.stack_bytes, [round(16 * us) for us in pairs])
+
+
+def _run_mission(compiled: Compiled, folder: Path) -> Row:
+    """Measure 60 s of a vehicle in the loop: the cycles awake per sample, telemetry's share too."""
+    chip = ChipFlight(Vehicle(chip_mission()))
+    fly_simulated(compiled.elf, chip, samples=600)
+    samples = np.diff([row["sample"] for row in chip.rows])
+    awake_us = np.array([row["awake_us"] for row in chip.rows[1:]]) / samples
+    return _row(folder.name, compiled, chip.stack_bytes, [round(16 * us) for us in awake_us])
 
 
 # ---- Compare and write ---------------------------------------------------------------------------
@@ -493,6 +540,13 @@ def page(rows: list[Row]) -> str:
         "serial text included; `replay` counts predict, update and feedback by the chip's timer;",
         "`tracking_loop` counts the cycles awake between two samples, `slave_tracking` those",
         "between two pings, serial text included.",
+        f"{ECHOES} times at the beginning of the paper's scenario. The examples: `first_steps` is",
+        "its whole run, serial text included; `replay` counts predict, update and feedback by the",
+        "chip's timer; `tracking_loop` counts the cycles awake between two samples,",
+        "`slave_tracking` those between two pings, serial text included, and `mission` those per",
+        "sample of 0.1 s. Its pilot by itself, in 100 s of the same mission: `pilot_steer` is",
+        "guidance and control, `pilot_predict` heading and estimate, each twice because of late",
+        "fixes, `pilot_update` one fix.",
         "",
         "Flash and static RAM are what the IDE reports (bytes); the stack is the deepest of the",
         "whole run from the end of the RAM, interrupts included.",

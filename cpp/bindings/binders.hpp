@@ -33,6 +33,7 @@ void bind_filters(py::module_& m);
 void bind_function_models(py::module_& m);
 void bind_cooperative(py::module_& m);
 void bind_mission(py::module_& m);
+void bind_pilot(py::module_& m);
 void bind_vehicle(py::module_& m);
 void bind_tracking(py::module_& m);
 void bind_slat(py::module_& m);

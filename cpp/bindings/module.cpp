@@ -15,6 +15,7 @@ PYBIND11_MODULE(_core, m) {
   bind_slat(m);
   bind_cooperative(m);
   bind_mission(m);
+  bind_pilot(m);
   bind_vehicle(m);
   bind_self_test(m);
 }

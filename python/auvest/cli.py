@@ -26,6 +26,7 @@ COMMANDS: Mapping[tuple[str, ...], str] = {
     ),
     ("filters",): "List the filters: what each takes, and where it runs with the same bits.",
     ("import",): "Turn a published recording into logs for 'auvest replay'.",
+    ("mission",): "Play the vehicle that the sketch mission steers, on a board or simulated.",
     ("replay",): "Replay recorded runs through a filter.",
     ("simulate", "aukf"): (
         "Simulate the AUKF paper's scenario and show errors, intervals and consistency."
@@ -159,6 +160,8 @@ def _main(
       auvest replay --help               your own recordings through any filter
 
       auvest cost my_models.hpp          what your models take on the chip, and their bits there
+
+      auvest mission --help              the vehicle in the loop of a board that steers it
 
       auvest capture --help              record what a board reports, real or simulated
     """

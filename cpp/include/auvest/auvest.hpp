@@ -35,6 +35,7 @@
 #include "auvest/intervals/fixed_interval.hpp"
 #include "auvest/intervals/mahalanobis_interval.hpp"
 #include "auvest/math/random.hpp"
+#include "auvest/mission/pilot.hpp"
 #include "auvest/models/body_velocity.hpp"
 #include "auvest/models/constant_acceleration.hpp"
 #include "auvest/models/constant_velocity.hpp"

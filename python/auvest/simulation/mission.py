@@ -85,6 +85,9 @@ class Mission(Checked):
         Period of the loop; speed through the water and depth that are held.
     current_m_s, current_rad
         Current, and where it flows to; NaN: drawn for each run.
+    current_walk, current_sigma_m_s
+        Random walk of the current, m^2/s^3; where it is not 0 the current begins with a draw of
+        this deviation per axis.
     initial_error_m
         Standard deviation of the first estimate's error, per axis.
     compass_bias_rad, compass_noise_rad, gyro_noise_rad_s, gyro_walk_rad_s, depth_noise_m
@@ -127,6 +130,8 @@ class Mission(Checked):
     depth_m: float = not_negative(_DEFAULTS["depth_m"])
     current_m_s: float = not_negative(_DEFAULTS["current_m_s"])
     current_rad: float = _DEFAULTS["current_rad"]
+    current_walk: float = not_negative(_DEFAULTS["current_walk"])
+    current_sigma_m_s: float = not_negative(_DEFAULTS["current_sigma_m_s"])
     initial_error_m: float = not_negative(_DEFAULTS["initial_error_m"])
     compass_bias_rad: float = not_negative(_DEFAULTS["compass_bias_rad"])
     compass_noise_rad: float = not_negative(_DEFAULTS["compass_noise_rad"])
@@ -261,7 +266,6 @@ def simulate(
         After Ctrl-C; ``partial`` has the runs that are done.
     """
     as_instance("mission", mission, Mission)
-    kernel = Unit() if mission.kernel is None else as_kernel(mission.kernel)
     longest = mission.circle_s if mission.track == "circle" else mission.most_s
     rows = min(int(longest / mission.period_s) + 2, _ROWS) if record else 0
     if mission.runs * rows > MAX_STEPS:
@@ -269,19 +273,13 @@ def simulate(
             f"{mission.runs} runs of {rows} steps are more than {MAX_STEPS:,}: record=False keeps "
             "the numbers of each run alone"
         )
-    values = {name: getattr(mission, name) for name in _DEFAULTS}
-    values.update(
-        track=mission.track,
-        estimate=mission.estimate,
-        guidance=mission.guidance,
-        interval=core_interval(mission.interval, "float64"),
-        kernel=core_kernel(kernel, "float64"),
-        rejections=0 if mission.recovery is None else mission.recovery.rejections,
-        freedom=mission.degrees_of_freedom,
-        dtype=mission.dtype,
-        seed=mission.seed,
-        rows=rows,
-    )
+    values = {
+        **core_scenario(mission),
+        "freedom": mission.degrees_of_freedom,
+        "dtype": mission.dtype,
+        "seed": mission.seed,
+        "rows": rows,
+    }
 
     def part(first: int, count: int) -> dict[str, npt.NDArray[Any]]:
         return _core.fly_missions({**values, "first_run": first, "runs": count})
@@ -306,6 +304,20 @@ def simulate(
             stop.partial = finished(stop.partial)
         raise
     return finished(columns)
+
+
+def core_scenario(mission: Mission) -> dict[str, Any]:
+    """Give a mission as the core takes it."""
+    kernel = Unit() if mission.kernel is None else as_kernel(mission.kernel)
+    return {
+        **{name: getattr(mission, name) for name in _DEFAULTS},
+        "track": mission.track,
+        "estimate": mission.estimate,
+        "guidance": mission.guidance,
+        "interval": core_interval(mission.interval, "float64"),
+        "kernel": core_kernel(kernel, "float64"),
+        "rejections": 0 if mission.recovery is None else mission.recovery.rejections,
+    }
 
 
 def settings(mission: Mission) -> dict[str, Any]:

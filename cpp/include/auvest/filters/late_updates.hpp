@@ -94,6 +94,12 @@ class LateMemory {
   explicit LateMemory(const Filter& filter, const Events& events = Events())
       : base_(filter), events_(events) {}
 
+  /// Forgets everything and goes on from where `filter` is.
+  void restart(const Filter& filter) {
+    base_ = filter;
+    while (events_.size() > 0) events_.remove_first();
+  }
+
   /// Carries the filter dt >= 0 seconds forward with this input.
   Status predict(Filter& filter, Scalar dt, const Input& input) {
     const Status status = filter.predict(dt, input);

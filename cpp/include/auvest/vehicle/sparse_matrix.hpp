@@ -9,6 +9,7 @@
 #include "auvest/types.hpp"
 
 namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar, int Rows, int Cols = Rows>
 class SparseMatrix {
@@ -82,4 +83,5 @@ class SparseMatrix {
   Scalar number_[Rows * Cols];
 };
 
+}  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

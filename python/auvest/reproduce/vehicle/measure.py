@@ -93,10 +93,12 @@ NOISE_FREE: Mapping[tuple[str, TrackKind], tuple[float, float, float, float]] = 
 #: To which the prototypes' values are printed, with a rounding of ours on top.
 NOISE_FREE_TOLERANCE_M = 1e-4
 
-#: Compass bias (deg), noise on the position (m^2/s) and walk of the current (m^2/s^3) with which
-#: consistency is judged: noises that are what the sensors have (the log's 0.05 m/s at 10 Hz are
-#: 2.5e-4 m^2/s, the filtered compass brings the rest; the current stands still), and the defaults.
-CONSISTENCY = ((0.0, 2.8e-4, 6e-8), (0.0, OUR_POSITION, 1e-5), (1.0, OUR_POSITION, 1e-5))
+#: Compass bias (deg), noise on the position (m^2/s) and walk of the current in the world (m^2/s^3)
+#: with which consistency is judged: where the model holds (the log's 0.05 m/s at 10 Hz are 2.5e-4
+#: m^2/s, the heading adds 2e-5; the current walks as the filter thinks), and as the table has it.
+CONSISTENCY = ((0.0, 2.7e-4, 1e-5), (0.0, OUR_POSITION, 0.0), (1.0, OUR_POSITION, 0.0))
+#: Seeds over which it is averaged: errors of the current last for minutes, one set is one draw.
+CONSISTENCY_SEEDS = 4
 
 #: Fixed intervals (s) from which one is read that is as accurate as an adaptive policy.
 FIXED_S = (0.3, 0.4, 0.5, 0.7, 1.0)
@@ -167,7 +169,7 @@ class Consistency:
 
     bias_deg: float
     model_position: float
-    model_current: float
+    current_walk: float
     nees_position: float
     nees: float
     nees_position_inside: float
@@ -350,27 +352,29 @@ def _consistency(
     workers: int | None,
     tick: Ticks,
 ) -> Consistency:
-    bias_deg, position, current = case
-    plan = mission.source(
-        "model_aided_crab",
-        "lawnmower",
-        compass_bias_rad=radians(bias_deg),
-        model_position=position,
-        model_current=current,
-        **options,
-    )
-    result = mission.simulate(plan, workers=workers)
+    bias_deg, position, walk = case
+    shares = []
+    for seed in range(options["seed"], options["seed"] + CONSISTENCY_SEEDS):
+        plan = mission.source(
+            "model_aided_crab",
+            "circle",
+            compass_bias_rad=radians(bias_deg),
+            model_position=position,
+            current_walk=walk,
+            **{**options, "seed": seed},
+        )
+        result = mission.simulate(plan, workers=workers)
+        place, all_ = _inside(result.nees_position, 2), _inside(result.nees, 4)
+        shares.append((place[0], all_[0], place[1], all_[1], *_inside(result.nis, 2)))
     tick()
-    place, all_ = _inside(result.nees_position, 2), _inside(result.nees, 4)
-    nis = _inside(result.nis, 2)
-    return Consistency(*case, place[0], all_[0], place[1], all_[1], nis[0], nis[1])
+    return Consistency(*case, *(float(mean) for mean in np.mean(shares, axis=0)))
 
 
 def _inside(values: Floats, freedom: int) -> tuple[float, float]:
-    """Mean, and share of the times at which all runs fly whose mean is in its 95 % bounds."""
+    """Mean, and share of the times at which at least half of the runs have a value: in bounds."""
     known = np.isfinite(values)
     count = known.sum(axis=0)
-    full = count == len(values) if freedom == 4 else count >= max(2, len(values) // 2)
+    full = count >= max(2, len(values) // 2)
     mean = np.where(known, values, 0.0).sum(axis=0)[full] / count[full]
     total = freedom * count[full]
     low, high = (stats.chi2.ppf(p, total) / count[full] for p in (0.025, 0.975))

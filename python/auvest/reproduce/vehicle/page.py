@@ -26,6 +26,7 @@ def page(result: measure.Reproduction) -> str:
     return markdown.page(
         __name__,
         result=result,
+        measure=measure,
         lawnmower=_table(result, "lawnmower"),
         circle=_table(result, "circle"),
         compared=len(distances),
@@ -47,7 +48,7 @@ def page(result: measure.Reproduction) -> str:
             (
                 f"{c.bias_deg:g}",
                 f"{c.model_position:g}",
-                f"{c.model_current:g}",
+                f"{c.current_walk:g}",
                 f"{c.nees_position:.2f}",
                 f"{100 * c.nees_position_inside:.0f} %",
                 f"{c.nees:.2f}",

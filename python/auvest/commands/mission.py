@@ -1,0 +1,413 @@
+"""``auvest mission``: play the vehicle that the sketch ``mission`` steers, on a board or simulated.
+
+The sketch runs on an Arduino at --port, or on a simulated one with --simulator. Hull, current and
+sensors are here: the board reads compass, gyro, log, depth and fixes over its serial line, and its
+commands move the hull. Each run is set beside the same run without a chip ('auvest simulate
+mission' with the same seed), and every command of the chip beside that of its own pilot on the
+desk.
+
+Examples
+--------
+  auvest mission --simulator mission.ino.elf
+
+  auvest mission --simulator mission.ino.elf --runs 20
+
+  auvest mission --simulator mission.ino.elf --latency 0.4 --outliers 0.05
+
+  auvest mission --port /dev/ttyACM0 --duration 60
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from threading import Event
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from rich.table import Table
+
+from auvest.board import BoardError
+from auvest.commands import options
+from auvest.commands.console import Terminal, table
+from auvest.commands.exit_codes import ExitCode
+from auvest.commands.files import write_csv
+from auvest.commands.options import WORLD, finite, fraction, option, refuse_given
+from auvest.commands.session import Floats, Session
+from auvest.commands.simulate_mission import mean_and_error
+from auvest.simulation import mission
+from auvest.simulation.mission import Mission
+from auvest.simulation.vehicle_in_the_loop import (
+    DELAY_S,
+    PERIOD_S,
+    ChipFlight,
+    Vehicle,
+    VehicleError,
+    chip_mission,
+    fly_on_desk,
+    fly_simulated,
+)
+
+#: Without a line for this long, s, the board is taken for lost.
+SILENCE_S = 10.0
+_MISSION = Mission()
+
+
+def command(
+    ctx: typer.Context,
+    port: Annotated[
+        str | None, typer.Option(help="Serial port of the board, like /dev/ttyACM0 or COM3.")
+    ] = None,
+    baud: Annotated[int, typer.Option(min=300, help="Baud rate of --port.")] = 115200,
+    simulator: Annotated[
+        Path | None,
+        typer.Option(
+            exists=True,
+            dir_okay=False,
+            help="The compiled sketch (.elf), run on a simulated board.",
+        ),
+    ] = None,
+    duration: Annotated[
+        float | None,
+        typer.Option(
+            callback=options.positive,
+            help="Seconds to fly.",
+            show_default="to the end of the plan",
+        ),
+    ] = None,
+    current: Annotated[
+        float, option(WORLD, "Speed of the current, m/s.", check=options.not_negative)
+    ] = _MISSION.current_m_s,
+    current_direction: Annotated[
+        float | None,
+        option(
+            WORLD,
+            "Where it flows to, degrees from north; default: drawn for each run.",
+            check=finite,
+        ),
+    ] = None,
+    outliers: Annotated[float, option(WORLD, "Share of late ranges.", check=fraction)] = 0.0,
+    latency: Annotated[
+        float, option(WORLD, "Delay of a fix, s.", check=options.not_negative)
+    ] = 0.0,
+    dropout: Annotated[float, option(WORLD, "Share of fixes that are lost.", check=fraction)] = 0.0,
+    compass_bias: Annotated[
+        float, option(WORLD, "Its standard deviation, degrees.", check=options.not_negative)
+    ] = math.degrees(_MISSION.compass_bias_rad),
+    runs: Annotated[
+        int, option(options.MONTE_CARLO, "Runs on the simulated board.", min=1, max=1000)
+    ] = 1,
+    seed: options.Seed = 1,
+    workers: options.Workers = None,
+    output: options.Output = Path("auvest-output/mission"),
+    no_figure: options.NoFigure = False,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Fly; the help text is the module's."""
+    terminal = Terminal(as_json=as_json, quiet=quiet)
+    if (port is None) == (simulator is None):
+        raise typer.BadParameter("give one of the two.", param_hint="'--port' / '--simulator'")
+    if simulator is not None:
+        refuse_given(ctx, ("baud",), "belongs to --port.")
+    else:
+        refuse_given(ctx, ("runs", "workers"), "belongs to --simulator.")
+    with terminal.usage_errors():
+        plan = chip_mission(
+            current_m_s=current,
+            current_rad=math.nan if current_direction is None else math.radians(current_direction),
+            compass_bias_rad=math.radians(compass_bias),
+            usbl_outliers=outliers,
+            usbl_latency_s=latency,
+            usbl_dropout=dropout,
+            runs=runs,
+            seed=seed,
+        )
+    source = str(simulator or port)
+    settings = {"source": source, "duration_s": duration, **mission.settings(plan)}
+    session = Session(terminal, output, "mission", settings)
+    samples = None if duration is None else max(1, round(duration / PERIOD_S))
+    flights = [ChipFlight(Vehicle(plan, run)) for run in range(runs)]
+    expected = samples or round(mission.simulate(plan, record=False).duration_s.mean() / PERIOD_S)
+    with terminal.progress("samples") as progress:
+
+        def flown() -> None:
+            progress(sum(flight.vehicle.twin.sample for flight in flights), runs * expected)
+
+        try:
+            if simulator is not None:
+                _fly_all(simulator, flights, samples, workers, flown)
+            elif port is not None:
+                _fly_port(port, baud, flights[0], samples, flown)
+        except KeyboardInterrupt:
+            session.interrupted = True
+        except (BoardError, VehicleError, _ConnectionLost, FileNotFoundError, ValueError) as error:
+            session.trouble = str(error)  # ValueError: what was given as sketch is none
+    flights = [flight for flight in flights if flight.vehicle.flight.pose]
+    if not flights:
+        why = session.trouble or "interrupted"
+        code = ExitCode.INTERRUPTED if session.interrupted else ExitCode.FAILED
+        terminal.fail(f"the chip has not steered: {why}", code)
+
+    beside = compare(plan, flights)
+    values = measures(flights, beside)
+    with terminal.writing(output):
+        files = {"samples": write_csv(output / "samples.csv", _samples(flights[0]))}
+        files["runs"] = write_csv(output / "runs.csv", beside)
+        if not no_figure:
+            files["figure"] = _draw(output / "figure.png", flights[0], source)
+    session.report(values, files, _table(values, source))
+    if len(flights) > 1:
+        terminal.result(_runs_table(beside))
+    lost = f"{session.trouble}; the samples until then are kept" if session.trouble else ""
+    differing = values["differing_commands"]
+    wrong = f"{differing} commands of the chip are not those of its pilot here" if differing else ""
+    session.end("the samples until then are kept", lost, wrong)
+
+
+def _fly_all(
+    elf: Path,
+    flights: list[ChipFlight],
+    samples: int | None,
+    workers: int | None,
+    flown: Callable[[], None],
+) -> None:
+    """Fly all runs; the first failure, and Ctrl-C, ends those that are under way."""
+    ended = Event()
+
+    def go_on() -> None:
+        flown()
+        if ended.is_set():
+            raise _Ended
+
+    def fly(chip: ChipFlight) -> None:
+        if not ended.is_set():
+            fly_simulated(elf, chip, samples=samples, progress=go_on)
+
+    with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
+        futures = [pool.submit(fly, chip) for chip in flights]
+        try:
+            for future in futures:
+                future.result()
+        finally:
+            ended.set()
+
+
+class _Ended(RuntimeError):
+    """Another run has failed, or Ctrl-C came."""
+
+
+class _ConnectionLost(RuntimeError):
+    """The port does not open, is gone, or is silent."""
+
+
+def _fly_port(
+    port: str, baud: int, chip: ChipFlight, samples: int | None, flown: Callable[[], None]
+) -> None:
+    """Play the vehicle for a board as long as its plan goes on and the board is heard."""
+    try:
+        import serial
+    except ImportError:
+        raise _ConnectionLost("--port needs pyserial: pip install 'auvest[serial]'") from None
+    try:
+        with serial.Serial(port, baud, timeout=0.1) as link:
+            last_s = time.monotonic()
+            received = b""
+            while not chip.over(samples):
+                received += link.readline()
+                now = time.monotonic()
+                if received.endswith(b"\n"):
+                    answers = chip.hear(received.decode("latin-1").rstrip("\r\n"), now)
+                    received, last_s = b"", now
+                    text = "".join(f"{line}\r\n" for _, line in answers)
+                    link.write(text.encode("latin-1"))
+                    flown()
+                if now - last_s > SILENCE_S:
+                    raise _ConnectionLost(
+                        f"{port}: no line for {SILENCE_S:g} s: does the board run mission, at "
+                        f"{baud} baud?"
+                    )
+    except (serial.SerialException, OSError) as error:
+        raise _ConnectionLost(f"{port}: {error}") from None
+    finally:
+        chip.vehicle.finish()
+
+
+def compare(plan: Mission, flights: list[ChipFlight]) -> dict[str, Floats]:
+    """Set each run beside the same run on the desk: cross-track errors and what the line does.
+
+    Runs that were not flown to the end are compared as far as they went.
+    """
+    rows: list[tuple[float, ...]] = []
+    for chip in flights:
+        run, flown = chip.vehicle.run, chip.vehicle.flight
+        count = len(flown.pose)
+        desk, rounded, delayed = (
+            fly_on_desk(plan, run, rounded=rounded, delay_s=delay_s).settled_rms_m(count=count)
+            for rounded, delay_s in ((False, 0.0), (True, 0.0), (False, DELAY_S))
+        )
+        settled = flown.settled_rms_m()
+        rows.append(
+            (run, settled, desk, settled - desk, rounded - desk, delayed - desk, flown.all_rms_m)
+        )
+    names = (
+        "run",
+        "settled_rms_m",
+        "desk_settled_rms_m",
+        "difference_m",
+        "by_rounding_m",
+        "by_delay_m",
+        "all_rms_m",
+    )
+    return dict(zip(names, np.array(rows, float).T, strict=True))
+
+
+def measures(flights: list[ChipFlight], beside: dict[str, Floats]) -> dict[str, Any]:
+    """Compute the numbers of the table; shares and counts are of all runs together."""
+    numbers: dict[str, Any] = {
+        "runs": len(flights),
+        "finished_runs": sum(chip.vehicle.flight.finished for chip in flights),
+        "samples": sum(chip.vehicle.twin.sample for chip in flights),
+        "commands": sum(len(chip.vehicle.delays_s) for chip in flights),
+        "differing_commands": sum(chip.vehicle.differing for chip in flights),
+    }
+    for name in ("settled_rms_m", "desk_settled_rms_m", "difference_m", "all_rms_m"):
+        numbers[name], numbers[f"{name}_se"] = mean_and_error(beside[name])
+    for name in ("by_rounding_m", "by_delay_m"):
+        numbers[name], _ = mean_and_error(beside[name])
+    delays = np.concatenate([chip.vehicle.delays_s for chip in flights])
+    last = [chip.rows[-1] for chip in flights if chip.rows]
+    awake_us = np.concatenate([[row["awake_us"] for row in chip.rows[1:]] for chip in flights])
+    span = sum(chip.rows[-1]["time_s"] - chip.rows[0]["time_s"] for chip in flights if chip.rows)
+    numbers["position_rms_m"], _ = mean_and_error(
+        np.array([chip.vehicle.flight.position_rms_m for chip in flights])
+    )
+    numbers.update(
+        awake_share_simulated=float(np.mean([chip.awake_share for chip in flights])),
+        awake_share_by_board=1e-6 * float(awake_us.sum()) / span if span > 0 else math.nan,
+        stack_bytes=max(chip.stack_bytes for chip in flights),
+        command_delay_s=float(delays.mean()) if delays.size else math.nan,
+        longest_command_delay_s=float(delays.max()) if delays.size else math.nan,
+        lines_refused=int(sum(row["refused"] for row in last)),
+        readings_missed=int(sum(row["missed"] for row in last)),
+        implausible=int(sum(row["implausible"] for row in last)),
+        late=int(sum(row["late"] for row in last)),
+        damaged_lines=sum(chip.damaged for chip in flights),
+        serial_overruns=sum(chip.serial_overruns for chip in flights),
+    )
+    return numbers
+
+
+def _samples(chip: ChipFlight) -> dict[str, Floats]:
+    flight = chip.vehicle.flight
+    along, cross = flight.beside()
+    pose, estimate, command = map(np.array, (flight.pose, flight.estimate_m, flight.command))
+    columns = {
+        "sample": np.array(flight.sample, float),
+        "north_m": pose[:, 0],
+        "east_m": pose[:, 1],
+        "depth_m": pose[:, 2],
+        "estimate_north_m": estimate[:, 0],
+        "estimate_east_m": estimate[:, 1],
+        "leg": np.array(flight.leg, float),
+        "along_m": along,
+        "cross_m": cross,
+    }
+    names = ("rudder_rad", "stern_planes_rad", "propeller_rev_s")
+    return {**columns, **dict(zip(names, command.T, strict=True))}
+
+
+def _draw(path: Path, chip: ChipFlight, source: str) -> Path:
+    from auvest import plots  # here, because matplotlib takes long to import
+
+    columns = _samples(chip)
+    time_s = (columns["sample"] - 1) * PERIOD_S
+    figure = plots.new_figure((10.0, 6.0), f"{Path(source).name}: {time_s[-1]:.0f} s")
+    grid = figure.add_gridspec(3, 2, width_ratios=(1.0, 1.25))
+    plane = figure.add_subplot(grid[:, 0])
+    wanted = mission.LAWNMOWER
+    plane.plot(wanted[:, 1], wanted[:, 0], color=plots.GREY, linewidth=3, alpha=0.4, label="plan")
+    north, east = columns["north_m"], columns["east_m"]
+    plane.plot(east, north, color=plots.BLACK, linewidth=1.2, label="vehicle")
+    north, east = columns["estimate_north_m"], columns["estimate_east_m"]
+    plane.plot(east, north, color=plots.BLUE, linewidth=0.7, label="estimate")
+    plane.plot(0, 0, "^", color=plots.GREEN, markersize=8, linestyle="none", label="USBL")
+    plane.set(xlabel="east / m", ylabel="north / m")
+    plane.set_aspect("equal", adjustable="datalim")
+    plane.legend(fontsize=8)
+    panels = [plane]
+    for row, (label, values, colour) in enumerate(
+        (
+            ("cross-track / m", columns["cross_m"], plots.BLACK),
+            ("rudder / deg", np.degrees(columns["rudder_rad"]), plots.VERMILION),
+            ("depth / m", columns["depth_m"], plots.BLUE),
+        )
+    ):
+        panel = figure.add_subplot(grid[row, 1], sharex=panels[1] if row else None)
+        panel.plot(time_s, values, color=colour, linewidth=0.8)
+        panel.set_ylabel(label)
+        panels.append(panel)
+    panels[-1].set_xlabel("time / s")
+    for axes in panels:
+        plots.style(axes)
+    return plots.save(figure, path)
+
+
+def _table(values: dict[str, Any], source: str) -> Table:
+    def with_error(name: str) -> str:
+        error = values[f"{name}_se"]
+        return f"{values[name]:.4f}" + ("" if math.isnan(error) else f" ± {error:.4f}")
+
+    simulated = math.isfinite(values["awake_share_simulated"])
+    share = values["awake_share_simulated" if simulated else "awake_share_by_board"]
+    rows: list[tuple[str, ...]] = [
+        ("cross-track RMS, settled / m", with_error("settled_rms_m"), "from 50 m into a leg"),
+        ("the same without a chip / m", with_error("desk_settled_rms_m"), "same seeds, float32"),
+        ("difference / m", with_error("difference_m"), "chip and line"),
+        ("  of text rounded / m", f"{values['by_rounding_m']:+.4f}", "alone, on the desk"),
+        (
+            "  of the command's delay / m",
+            f"{values['by_delay_m']:+.4f}",
+            f"alone, {1e3 * DELAY_S:.0f} ms",
+        ),
+        ("cross-track RMS, corners too / m", with_error("all_rms_m"), ""),
+        ("position error of the estimate / m", f"{values['position_rms_m']:.3f}", "RMS"),
+        (
+            "commands that differ",
+            f"{values['differing_commands']} of {values['commands']}",
+            "from those of its pilot here, to the bit",
+        ),
+        (
+            "time awake",
+            f"{100 * share:.1f} %",
+            "counted by the simulator" if simulated else "by the board, without interrupts",
+        ),
+        ("sample to command, mean / ms", f"{1e3 * values['command_delay_s']:.1f}", ""),
+        ("longest / ms", f"{1e3 * values['longest_command_delay_s']:.1f}", ""),
+        ("readings missed", f"{values['readings_missed']}", "not there in time"),
+        ("lines refused", f"{values['lines_refused']}", "corrupt, late or of another sample"),
+        ("readings implausible", f"{values['implausible']}", "refused by the pilot"),
+        ("deadlines missed", f"{values['late']}", "by more than 1 ms"),
+        ("lines damaged", f"{values['damaged_lines']}", "on their way from the board"),
+    ]
+    if simulated:
+        rows.insert(9, ("deepest stack / B", f"{values['stack_bytes']}", ""))
+    title = (
+        f"{source}: {values['finished_runs']} of {values['runs']} runs to the end, "
+        f"{values['samples']} samples"
+    )
+    return table(title, ("quantity", "value", "note"), rows, right={1})
+
+
+def _runs_table(beside: dict[str, Floats]) -> Table:
+    header = ("run", "settled / m", "without chip / m", "difference / m", "rounding", "delay")
+    rows = [
+        (f"{int(run)}", *(f"{value:.4f}" for value in cells))
+        for run, *cells in zip(*list(beside.values())[:6], strict=True)
+    ]
+    return table("each run", header, rows, right=set(range(6)))
