@@ -101,8 +101,7 @@ class Hull {
     return math::is_positive_definite(mass_) ? Status::kOk : Status::kNotPositiveDefinite;
   }
 
-  // ---- The state
-  // ---------------------------------------------------------------------------------
+  // ---- The state -------------------------------------------------------------------------------
 
   /// At the origin, level, heading north, at rest over ground, actuators at 0.
   State at_rest(const Current& current) const {
@@ -127,8 +126,7 @@ class Hull {
     for (int i = 0; i < kVelocities; ++i) x(kVelocities + i) = ground(i) - stream(i);
   }
 
-  // ---- Rates, for a number or for a batch of them
-  // ------------------------------------------------
+  // ---- Rates, for a number or for a batch of them ----------------------------------------------
 
   template <class Value>
   static Attitude<Value> attitude(const Vector<Value, kStates>& x) {
