@@ -72,6 +72,7 @@
 #include "auvest/vehicle/hull.hpp"
 #include "auvest/vehicle/integrate.hpp"
 #include "auvest/vehicle/remus100.hpp"
+#include "auvest/vehicle/remus100_prestero.hpp"
 #include "auvest/vehicle/rov.hpp"
 #include "auvest/vehicle/spheroid.hpp"
 #include "auvest/vehicle/stable_step.hpp"

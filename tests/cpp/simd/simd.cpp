@@ -14,6 +14,9 @@
 #include "auvest/models/piecewise_acceleration.hpp"
 #include "auvest/models/slave_motion.hpp"
 #include "auvest/slat/slatf.hpp"
+#include "auvest/vehicle/bluerov2_heavy.hpp"
+#include "auvest/vehicle/integrate.hpp"
+#include "auvest/vehicle/remus100.hpp"
 
 namespace {
 
@@ -198,6 +201,73 @@ TEST_CASE("random numbers: each lane draws what its particle draws alone") {
       CHECK(same(found[1][k], d));
     }
   }
+}
+
+/// Runs of a hull from different states, with different commands and currents, one per lane; `size`
+/// is that of each command.
+template <class Hull, class Method>
+void check_hull(const Hull& hull, const std::vector<float>& size) {
+  constexpr std::size_t n = Hull::kStates;
+  constexpr std::size_t m = Hull::kActuators;
+  constexpr std::size_t width = Lanes::kWidth;
+  Random random(3);
+  const auto lanes = [&](Value* batch, std::size_t count, float* single, float scale) {
+    for (std::size_t i = 0; i < count; ++i) {
+      float numbers[width];
+      for (std::size_t lane = 0; lane < width; ++lane) {
+        numbers[lane] = scale * (2.0f * random.uniform<float>() - 1.0f);
+        single[lane * count + i] = numbers[lane];
+      }
+      batch[i] = Lanes::load(numbers);
+    }
+  };
+  auvest::Vector<Value, Hull::kStates> x;
+  auvest::Vector<Value, Hull::kActuators> command;
+  auvest::Vector<Value, 3> current;
+  float states[width * n], commands[width * m], currents[width * 3];
+  lanes(x.data(), n, states, 0.3f);
+  lanes(command.data(), m, commands, 1.0f);
+  lanes(current.data(), 3, currents, 0.5f);
+  for (std::size_t i = 0; i < m; ++i) {
+    const int row = static_cast<int>(i);
+    command(row) = command(row) * Value(size[i]);
+    for (std::size_t lane = 0; lane < width; ++lane) commands[lane * m + i] *= size[i];
+  }
+  for (int k = 0; k < 200; ++k) Method::step(hull, x, command, current, 0.05f);
+  std::size_t different = 0;
+  for (std::size_t lane = 0; lane < width; ++lane) {
+    typename Hull::State alone;
+    typename Hull::Command c;
+    typename Hull::Current v;
+    std::memcpy(alone.data(), states + lane * n, sizeof alone);
+    std::memcpy(c.data(), commands + lane * m, sizeof c);
+    std::memcpy(v.data(), currents + lane * 3, sizeof v);
+    for (int k = 0; k < 200; ++k) Method::step(hull, alone, c, v, 0.05f);
+    for (std::size_t i = 0; i < n; ++i) {
+      float numbers[width];
+      Lanes::store(numbers, x(static_cast<int>(i)));
+      different += same(numbers[lane], alone(static_cast<int>(i))) ? 0 : 1;
+    }
+  }
+  CHECK(different == 0);
+}
+
+TEST_CASE("hulls: every bit of 200 steps") {
+  using auvest::Hull;
+  using Keel = auvest::Keel<float>;
+  using Yacht = auvest::Torpedo<float, Keel>;
+  auto p = auvest::remus100<float, Keel>();
+  p.keel.foil.area_m2 = 0.02f;
+  p.rudder.servo.dead_band = 0.05f;
+  p.rudder.servo.rate_limit = 0.3f;
+  const std::vector<float> fins = {0.3f, 0.1f, 25.0f};
+  check_hull<Hull<Yacht>, auvest::Rk4>(Hull<Yacht>(p), fins);
+  check_hull<Hull<Yacht>, auvest::SemiImplicit>(Hull<Yacht>(p), fins);
+  check_hull<Hull<Yacht, auvest::FourDof>, auvest::Rk4>(Hull<Yacht, auvest::FourDof>(p), fins);
+  check_hull<Hull<Yacht, auvest::ThreeDof>, auvest::Rk4>(Hull<Yacht, auvest::ThreeDof>(p), fins);
+  using Rov = auvest::Rov<float, 8>;
+  const std::vector<float> inputs(8, 0.3f);
+  check_hull<Hull<Rov>, auvest::Rk4>(Hull<Rov>(auvest::bluerov2_heavy<float>()), inputs);
 }
 
 template <class Motion, class Proposal, class L>

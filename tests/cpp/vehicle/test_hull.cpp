@@ -32,8 +32,7 @@ typename Remus<Scalar>::Params ideal() {
   return p;
 }
 
-// ---- The parameters
-// ------------------------------------------------------------------------------
+// ---- The parameters -----------------------------------------------------------------------------
 
 TEST_CASE("remus100: the numbers follow from length, diameter and stated ratios") {
   const auto p = auvest::remus100<double>();
@@ -103,8 +102,7 @@ TEST_CASE("mass matrix: steps from the centre of gravity to the origin, for any 
   CHECK((M - H.transpose() * about_cg * H).norm() < 1e-14);
 }
 
-// ---- Coriolis
-// ------------------------------------------------------------------------------------
+// ---- Coriolis -----------------------------------------------------------------------------------
 
 TEST_CASE_TEMPLATE("Coriolis: does no work, for every symmetric M", Scalar, float, double) {
   Uniform uniform;
@@ -178,8 +176,7 @@ TEST_CASE("Coriolis: what is left without the Munk moment") {
   CHECK(tau[1] == close_to(30.2936055125789 * 0.3 * -0.4, 1e-14));
 }
 
-// ---- Conservation
-// --------------------------------------------------------------------------------
+// ---- Conservation -------------------------------------------------------------------------------
 
 TEST_CASE("ideal fluid: energy and momentum are conserved (Kirchhoff), RK4's drift is of order 5") {
   using Hull = Remus<double>;
@@ -256,8 +253,7 @@ TEST_CASE("RK4: of fourth order through actuators, fins and propeller") {
   }
 }
 
-// ---- Natural periods
-// -----------------------------------------------------------------------------
+// ---- Natural periods ----------------------------------------------------------------------------
 
 /// The mean period of an angle over ten zero crossings.
 template <class Hull>
@@ -306,8 +302,7 @@ TEST_CASE("natural periods: sway and surge swing with the hull") {
   CHECK(period(Rov<double>(p), 4) == close_to(3.3092, 2e-5));
 }
 
-// ---- Invariance
-// ----------------------------------------------------------------------------------
+// ---- Invariance ---------------------------------------------------------------------------------
 
 TEST_CASE_TEMPLATE("Galilei: a current only carries the hull away", Scalar, float, double) {
   using Hull = Remus<Scalar>;
@@ -414,8 +409,7 @@ TEST_CASE_TEMPLATE("neutral, level and at rest it stays, bit for bit", Scalar, f
   check_stays(Rov<Scalar>(p));
 }
 
-// ---- Terminal speeds
-// -----------------------------------------------------------------------------
+// ---- Terminal speeds ----------------------------------------------------------------------------
 
 TEST_CASE("torpedo: speed per revolution, once the linear drag is left out") {
   auto p = auvest::remus100<double>();
@@ -471,8 +465,7 @@ void check_rov_terminal(double relative) {
 TEST_CASE("ROV: terminal speeds") { check_rov_terminal<double>(0); }
 TEST_CASE("ROV: terminal speeds in float") { check_rov_terminal<float>(1e-6); }
 
-// ---- Dissipation and symmetry
-// --------------------------------------------------------------------
+// ---- Dissipation and symmetry -------------------------------------------------------------------
 
 /// Damping, lift and drag alone.
 template <class Hull>
@@ -575,8 +568,7 @@ TEST_CASE_TEMPLATE("the same acceleration by matrices, angles and quadrature", S
   }
 }
 
-// ---- Straight-line stability
-// ---------------------------------------------------------------------
+// ---- Straight-line stability --------------------------------------------------------------------
 
 /// Eigenvalues of (v, r) at speed u, the smaller first.
 template <class Hull>

@@ -17,8 +17,7 @@ double epsilon() {
   return double(std::numeric_limits<Scalar>::epsilon());
 }
 
-// ---- Cross flow
-// ----------------------------------------------------------------------------------
+// ---- Cross flow ---------------------------------------------------------------------------------
 
 TEST_CASE_TEMPLATE("cross flow: the closed form is the integral", Scalar, float, double) {
   const double printed[4][4] = {{0.3, 0.2, 0.1576533, 0.0409600},
@@ -78,8 +77,7 @@ TEST_CASE("cross flow: the peers' 21 strips of a twentieth exaggerate, by 5 and 
   CHECK(strips(0, 0.5, 1) / i1 == doctest::Approx(1.21).epsilon(1e-2));
 }
 
-// ---- Lift and drag, keel
-// -------------------------------------------------------------------------
+// ---- Lift and drag, keel ------------------------------------------------------------------------
 
 TEST_CASE_TEMPLATE("lift does no work, and the drag takes C_D0 + C_L^2/(pi e A)", Scalar, float,
                    double) {
@@ -155,8 +153,7 @@ TEST_CASE_TEMPLATE("keel: the example, dissipation, and none of area 0", Scalar,
   for (int i = 0; i < Remus<Scalar>::kStates; ++i) CHECK(a(i) == b(i));
 }
 
-// ---- Propeller and fins
-// --------------------------------------------------------------------------
+// ---- Propeller and fins -------------------------------------------------------------------------
 
 TEST_CASE_TEMPLATE("propeller: its coefficients at two advance ratios, braking, and backwards",
                    Scalar, float, double) {
@@ -224,8 +221,7 @@ TEST_CASE(
   }
 }
 
-// ---- Lags and thrust curves
-// ----------------------------------------------------------------------
+// ---- Lags and thrust curves ---------------------------------------------------------------------
 
 TEST_CASE("lag: saturation, dead band, rate limit, and the exponential between them") {
   auto p = auvest::Lag<double>::Params::symmetric(0.25, 0.1);

@@ -101,8 +101,7 @@ TEST_CASE("largest step: shorter where the ROV spins, and a Munk moment is no re
         doctest::Approx(0.278529).epsilon(1e-3));
 }
 
-// ---- Bad parameters
-// ------------------------------------------------------------------------------
+// ---- Bad parameters -----------------------------------------------------------------------------
 
 template <class Change>
 Status remus_with(Change change) {

@@ -109,8 +109,8 @@ AUVEST_INLINE Value row_times(const Scalar* row, const Value* v, Freedom) {
 
 /// tau <- tau - C(nu) nu for a symmetric M; `nu` has 0 where a projection drops the axis.
 template <class Freedom, class Scalar, class Value>
-AUVEST_OUTLINE AUVEST_INLINE void subtract_coriolis(const Matrix<Scalar, 6, 6>& M, const Value* nu,
-                                                    Value* tau, Freedom freedom) {
+AUVEST_OUTLINE void subtract_coriolis(const Matrix<Scalar, 6, 6>& M, const Value* nu, Value* tau,
+                                      Freedom freedom) {
   // A hull that only yaws meets P in x and y, and no H.
   const bool tilts = Freedom::keeps(kRoll) || Freedom::keeps(kPitch);
   const int rows = tilts ? 6 : 2;

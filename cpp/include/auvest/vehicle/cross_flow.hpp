@@ -18,8 +18,8 @@ namespace auvest {
 
 /// I0 [m^3/s^2] and I1 [m^4/s^2] of a hull of `length` [m] in the flow v + x r.
 template <class Scalar, class Value>
-AUVEST_OUTLINE AUVEST_INLINE void cross_flow_integrals(Scalar length, const Value& v,
-                                                       const Value& r, Value& i0, Value& i1) {
+AUVEST_OUTLINE void cross_flow_integrals(Scalar length, const Value& v, const Value& r, Value& i0,
+                                         Value& i1) {
   const Scalar third = Scalar(1) / Scalar(3);
   const Value a = math::absolute(v);
   const Value b = math::absolute(r) * Value(Scalar(0.5) * length);
@@ -65,7 +65,7 @@ struct CrossFlow {
       : params(p), scale_(Scalar(0.5) * density * p.diameter_m * p.drag) {}
 
   template <class Freedom, class Value>
-  AUVEST_INLINE void add_to(Value* tau, const Flow<Value>& flow, Freedom) const {
+  void add_to(Value* tau, const Flow<Value>& flow, Freedom) const {
     Value i0, i1;
     cross_flow_integrals(params.length_m, flow.nu[kSway], flow.nu[kYaw], i0, i1);
     tau[kSway] = tau[kSway] - Value(scale_) * i0;

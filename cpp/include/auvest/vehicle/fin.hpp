@@ -41,8 +41,8 @@ struct Fin {
       : params(p), servo(p.servo), scale_(Scalar(0.5) * density * p.area_m2 * p.lift_slope) {}
 
   template <class Freedom, class Value>
-  AUVEST_OUTLINE AUVEST_INLINE void add_to(Value* tau, const Flow<Value>& flow, const Value& angle,
-                                           Freedom) const {
+  AUVEST_OUTLINE void add_to(Value* tau, const Flow<Value>& flow, const Value& angle,
+                             Freedom) const {
     const Value u = flow.nu[kSurge];
     const Value slope = Value(scale_) * (u * math::absolute(u));
     // [HULL F1]

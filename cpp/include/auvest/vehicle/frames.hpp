@@ -21,7 +21,7 @@ struct Attitude {
 
   /// Of the pose [positions, angles] of a projection.
   template <class Freedom>
-  static AUVEST_INLINE Attitude of(const Value* pose, Freedom) {
+  static Attitude of(const Value* pose, Freedom) {
     Attitude a;
     AUVEST_UNROLL
     for (int i = 0; i < Freedom::kSize; ++i) {
@@ -60,8 +60,8 @@ struct Attitude {
 /// The rates of the pose of a projection from the velocities `nu` through the water (all six, those
 /// of dropped axes 0) in water that moves with `current` (north, east, down).
 template <class Freedom, class Value>
-AUVEST_OUTLINE AUVEST_INLINE void pose_rates(const Attitude<Value>& a, const Value* nu,
-                                             const Value* current, Value* rate) {
+AUVEST_OUTLINE void pose_rates(const Attitude<Value>& a, const Value* nu, const Value* current,
+                               Value* rate) {
   Value velocity[3] = {nu[0], nu[1], nu[2]};
   a.to_world(velocity, Freedom());  // [AUKF 2] [HULL K1]
   Value across = nu[kYaw];          // the rate about the vertical, but for 1/cos(theta)

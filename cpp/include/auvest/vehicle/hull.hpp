@@ -14,7 +14,9 @@
 // A vehicle says what acts on the hull (torpedo.hpp, rov.hpp; your own is one struct). It offers
 //
 //     Scalar, Params                  Params: HullParams and the vehicle's own
-//     kActuators, kNeedsSpeed         kNeedsSpeed: whether a load reads the speed of the flow
+//     kActuators
+//     kNeedsSpeed                     whether a load reads the speed of the flow
+//     kAddedCoriolis                  whether C_A is left to the hull; false: a load has it
 //     demands(command, demand)        saturation and curves of the command, once per step
 //     actuator_rates(state, demand, rate)
 //     limit_actuators(state)          after a step
@@ -74,7 +76,7 @@ class Hull {
     RigidBody<Scalar>(p.body).add_to(coriolis_);
     math::copy(coriolis_, mass_);
     added_.add_to(mass_);
-    if (p.added_mass.munk) math::copy(mass_, coriolis_);
+    if (Vehicle::kAddedCoriolis && p.added_mass.munk) math::copy(mass_, coriolis_);
     invert();
   }
 
@@ -96,8 +98,7 @@ class Hull {
     return math::is_positive_definite(mass_) ? Status::kOk : Status::kNotPositiveDefinite;
   }
 
-  // ---- The state
-  // ---------------------------------------------------------------------------------
+  // ---- The state -------------------------------------------------------------------------------
 
   /// At the origin, level, heading north, at rest over ground, actuators at 0.
   State at_rest(const Current& current) const {
@@ -122,17 +123,16 @@ class Hull {
     for (int i = 0; i < kVelocities; ++i) x(kVelocities + i) = ground(i) - stream(i);
   }
 
-  // ---- Rates, for a number or for a batch of them
-  // ------------------------------------------------
+  // ---- Rates, for a number or for a batch of them ----------------------------------------------
 
   template <class Value>
-  static AUVEST_INLINE Attitude<Value> attitude(const Vector<Value, kStates>& x) {
+  static Attitude<Value> attitude(const Vector<Value, kStates>& x) {
     return Attitude<Value>::of(x.data(), Freedom());
   }
 
   /// What the actuators make of a command.
   template <class Value>
-  AUVEST_INLINE Vector<Value, kActuators> demands(const Vector<Value, kActuators>& command) const {
+  Vector<Value, kActuators> demands(const Vector<Value, kActuators>& command) const {
     Vector<Value, kActuators> demand;
     vehicle_.demands(command.data(), demand.data());
     return demand;
@@ -140,8 +140,8 @@ class Hull {
 
   /// The rates of the pose, into dx.
   template <class Value>
-  AUVEST_INLINE void pose_rate(const Attitude<Value>& a, const Vector<Value, kStates>& x,
-                               const Vector<Value, 3>& current, Vector<Value, kStates>& dx) const {
+  void pose_rate(const Attitude<Value>& a, const Vector<Value, kStates>& x,
+                 const Vector<Value, 3>& current, Vector<Value, kStates>& dx) const {
     Flow<Value> flow;
     flow.set(x.data() + kVelocities, false, Freedom());
     pose_rates<Freedom>(a, flow.nu, current.data(), dx.data());
@@ -149,9 +149,8 @@ class Hull {
 
   /// The rates of velocities and actuators, into dx.
   template <class Value>
-  AUVEST_INLINE void motion_rate(const Attitude<Value>& a, const Vector<Value, kStates>& x,
-                                 const Vector<Value, kActuators>& demand,
-                                 Vector<Value, kStates>& dx) const {
+  void motion_rate(const Attitude<Value>& a, const Vector<Value, kStates>& x,
+                   const Vector<Value, kActuators>& demand, Vector<Value, kStates>& dx) const {
     const Value* const actuators = x.data() + 2 * kVelocities;
     acceleration(a, x.data() + kVelocities, actuators, dx.data() + kVelocities);
     vehicle_.actuator_rates(actuators, demand.data(), dx.data() + 2 * kVelocities);
@@ -159,8 +158,8 @@ class Hull {
 
   /// dx = f(x), with the demands of a command.
   template <class Value>
-  AUVEST_INLINE void rate(const Vector<Value, kStates>& x, const Vector<Value, kActuators>& demand,
-                          const Vector<Value, 3>& current, Vector<Value, kStates>& dx) const {
+  void rate(const Vector<Value, kStates>& x, const Vector<Value, kActuators>& demand,
+            const Vector<Value, 3>& current, Vector<Value, kStates>& dx) const {
     const Attitude<Value> a = attitude(x);
     pose_rate(a, x, current, dx);
     motion_rate(a, x, demand, dx);
@@ -168,8 +167,8 @@ class Hull {
 
   /// d(nu_r)/dt from the velocities through the water and the state of the actuators.
   template <class Value>
-  AUVEST_OUTLINE AUVEST_INLINE void acceleration(const Attitude<Value>& a, const Value* velocities,
-                                                 const Value* actuators, Value* result) const {
+  AUVEST_OUTLINE void acceleration(const Attitude<Value>& a, const Value* velocities,
+                                   const Value* actuators, Value* result) const {
     Value tau[6];
     forces(a, velocities, actuators, tau);
     AUVEST_UNROLL
@@ -186,14 +185,14 @@ class Hull {
 
   /// tau - C nu_r - D nu_r - g, on the axes that are kept.
   template <class Value>
-  AUVEST_OUTLINE AUVEST_INLINE void forces(const Attitude<Value>& a, const Value* velocities,
-                                           const Value* actuators, Value* tau) const {
+  AUVEST_OUTLINE void forces(const Attitude<Value>& a, const Value* velocities,
+                             const Value* actuators, Value* tau) const {
     Flow<Value> flow;
     flow.set(velocities, Vehicle::kNeedsSpeed, Freedom());
     math::set_zero(tau, 6);
     vehicle_.add_loads(tau, flow, actuators, Freedom());  // [AUKF 1]
     subtract_coriolis(coriolis_, flow.nu, tau, Freedom());
-    if (!vehicle_.params.added_mass.munk) {
+    if (Vehicle::kAddedCoriolis && !vehicle_.params.added_mass.munk) {
       added_.subtract_reduced_coriolis(flow.nu, tau, Freedom());
     }
     restoring_.subtract_from(tau, a, Freedom());

@@ -33,7 +33,7 @@ struct Keel {
   Keel(const Params& p, Scalar density) : params(p), foil_(p.foil, density) {}
 
   template <class Freedom, class Value>
-  AUVEST_OUTLINE AUVEST_INLINE void add_to(Value* tau, const Flow<Value>& flow, Freedom) const {
+  AUVEST_OUTLINE void add_to(Value* tau, const Flow<Value>& flow, Freedom) const {
     if (params.foil.area_m2 == Scalar(0)) return;
     const Value x = Value(params.x_m);
     const Value z = Value(params.z_m);
@@ -75,7 +75,7 @@ struct NoKeel {
   NoKeel(const Params&, Scalar) {}
 
   template <class Freedom, class Value>
-  AUVEST_INLINE void add_to(Value*, const Flow<Value>&, Freedom) const {}
+  void add_to(Value*, const Flow<Value>&, Freedom) const {}
 
   Status check() const { return Status::kOk; }
 };

@@ -57,8 +57,8 @@ struct LiftDrag {
   /// `along` is the force in x, `across` that in y or z per velocity there: (along, across v,
   /// across w). `cross_square` is v^2 + w^2, `speed` the root of u^2 + cross_square.
   template <class Value>
-  AUVEST_OUTLINE AUVEST_INLINE void forces(const Value& u, const Value& cross_square,
-                                           const Value& speed, Value& along, Value& across) const {
+  AUVEST_OUTLINE void forces(const Value& u, const Value& cross_square, const Value& speed,
+                             Value& along, Value& across) const {
     // Below a micrometre per second the forces are less than 1e-9 N whatever the angle.
     const Value inverse = Value(1) / math::larger(speed, Value(1e-6));
     const Value cosine = u * inverse;
@@ -72,7 +72,7 @@ struct LiftDrag {
 
   /// Of the body as a whole.
   template <class Freedom, class Value>
-  AUVEST_INLINE void add_to(Value* tau, const Flow<Value>& flow, Freedom) const {
+  void add_to(Value* tau, const Flow<Value>& flow, Freedom) const {
     Value along, across;
     forces(flow.nu[kSurge], flow.cross_square, flow.speed, along, across);
     tau[kSurge] = tau[kSurge] + along;

@@ -43,7 +43,7 @@ struct LinearDamping {
   explicit LinearDamping(const Params& p) : params(p) {}
 
   template <class Freedom, class Value>
-  AUVEST_OUTLINE AUVEST_INLINE void add_to(Value* tau, const Flow<Value>& flow, Freedom) const {
+  AUVEST_OUTLINE void add_to(Value* tau, const Flow<Value>& flow, Freedom) const {
     const Scalar d[6] = {params.surge_kg_s,   params.sway_kg_s,     params.heave_kg_s,
                          params.roll_kg_m2_s, params.pitch_kg_m2_s, params.yaw_kg_m2_s};
     Value fading = Value(1);

@@ -75,8 +75,7 @@ struct Propeller {
 
   /// The force on the hull, thrust_deduction T, and the torque that rolls it.
   template <class Freedom, class Value>
-  AUVEST_OUTLINE AUVEST_INLINE void add_to(Value* tau, const Flow<Value>& flow, const Value& n,
-                                           Freedom) const {
+  AUVEST_OUTLINE void add_to(Value* tau, const Flow<Value>& flow, const Value& n, Freedom) const {
     tau[kSurge] = tau[kSurge] + Value(params.thrust_deduction) * thrust(n, flow.nu[kSurge]);
     if (!Freedom::keeps(kRoll) || params.roll_torque == Scalar(0)) return;
     tau[kRoll] = tau[kRoll] + Value(params.roll_torque) * torque(n, flow.nu[kSurge]);

@@ -36,7 +36,7 @@ struct QuadraticDamping {
   explicit QuadraticDamping(const Params& p) : params(p) {}
 
   template <class Freedom, class Value>
-  AUVEST_OUTLINE AUVEST_INLINE void add_to(Value* tau, const Flow<Value>& flow, Freedom) const {
+  AUVEST_OUTLINE void add_to(Value* tau, const Flow<Value>& flow, Freedom) const {
     const Scalar d[6] = {params.surge_kg_m, params.sway_kg_m,   params.heave_kg_m,
                          params.roll_kg_m2, params.pitch_kg_m2, params.yaw_kg_m2};
     AUVEST_UNROLL

@@ -42,8 +42,7 @@ struct Restoring {
 
   /// tau <- tau - g(eta).
   template <class Freedom, class Value>
-  AUVEST_OUTLINE AUVEST_INLINE void subtract_from(Value* tau, const Attitude<Value>& a,
-                                                  Freedom) const {
+  AUVEST_OUTLINE void subtract_from(Value* tau, const Attitude<Value>& a, Freedom) const {
     const bool tilts = Freedom::keeps(kRoll) || Freedom::keeps(kPitch);
     if (!tilts && !Freedom::keeps(kHeave)) return;
     // Down, in the body's frame.

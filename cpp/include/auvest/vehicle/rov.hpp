@@ -17,6 +17,7 @@ struct Rov {
   using Scalar = Scalar_;
   static constexpr int kActuators = Count;
   static constexpr bool kNeedsSpeed = false;
+  static constexpr bool kAddedCoriolis = true;
 
   struct Params : HullParams<Scalar> {
     typename LinearDamping<Scalar, false>::Params linear_damping;
@@ -45,25 +46,25 @@ struct Rov {
         thrusters(p.thrusters) {}
 
   template <class Freedom, class Value>
-  AUVEST_INLINE void add_loads(Value* tau, const Flow<Value>& flow, const Value* actuators,
-                               Freedom freedom) const {
+  void add_loads(Value* tau, const Flow<Value>& flow, const Value* actuators,
+                 Freedom freedom) const {
     linear_damping.add_to(tau, flow, freedom);
     quadratic_damping.add_to(tau, flow, freedom);
     thrusters.add_to(tau, actuators, freedom);
   }
 
   template <class Value>
-  AUVEST_INLINE void demands(const Value* command, Value* demand) const {
+  void demands(const Value* command, Value* demand) const {
     thrusters.demands(command, demand);
   }
 
   template <class Value>
-  AUVEST_INLINE void actuator_rates(const Value* state, const Value* demand, Value* rate) const {
+  void actuator_rates(const Value* state, const Value* demand, Value* rate) const {
     for (int i = 0; i < Count; ++i) rate[i] = thrusters.lag.rate(state[i], demand[i]);
   }
 
   template <class Value>
-  AUVEST_INLINE void limit_actuators(Value* state) const {
+  void limit_actuators(Value* state) const {
     for (int i = 0; i < Count; ++i) state[i] = thrusters.lag.limited(state[i]);
   }
 

@@ -75,13 +75,13 @@ struct Thrusters {
 
   /// The thrusts [N] that inputs ask for.
   template <class Value>
-  AUVEST_INLINE void demands(const Value* inputs, Value* thrusts) const {
+  void demands(const Value* inputs, Value* thrusts) const {
     for (int i = 0; i < Count; ++i) thrusts[i] = curve.thrust(inputs[i]);
   }
 
   /// tau <- tau + T f.
   template <class Freedom, class Value>
-  AUVEST_OUTLINE AUVEST_INLINE void add_to(Value* tau, const Value* thrusts, Freedom) const {
+  AUVEST_OUTLINE void add_to(Value* tau, const Value* thrusts, Freedom) const {
     AUVEST_UNROLL
     for (int i = 0; i < 6; ++i) {
       if (!Freedom::keeps(i)) continue;

@@ -28,6 +28,7 @@ struct Torpedo {
   using Scalar = Scalar_;
   static constexpr int kActuators = 3;
   static constexpr bool kNeedsSpeed = true;
+  static constexpr bool kAddedCoriolis = true;
 
   struct Params : HullParams<Scalar> {
     Scalar density_kg_m3 = Scalar(0);  ///< rho of the water
@@ -74,8 +75,8 @@ struct Torpedo {
         stern_planes(p.stern_planes, p.density_kg_m3) {}
 
   template <class Freedom, class Value>
-  AUVEST_INLINE void add_loads(Value* tau, const Flow<Value>& flow, const Value* actuators,
-                               Freedom freedom) const {
+  void add_loads(Value* tau, const Flow<Value>& flow, const Value* actuators,
+                 Freedom freedom) const {
     linear_damping.add_to(tau, flow, freedom);
     lift_drag.add_to(tau, flow, freedom);
     cross_flow.add_to(tau, flow, freedom);
@@ -86,21 +87,21 @@ struct Torpedo {
   }
 
   template <class Value>
-  AUVEST_INLINE void demands(const Value* command, Value* demand) const {
+  void demands(const Value* command, Value* demand) const {
     demand[kRudder] = rudder.servo.demand(command[kRudder]);
     demand[kSternPlanes] = stern_planes.servo.demand(command[kSternPlanes]);
     demand[kPropeller] = propeller.shaft.demand(command[kPropeller]);
   }
 
   template <class Value>
-  AUVEST_INLINE void actuator_rates(const Value* state, const Value* demand, Value* rate) const {
+  void actuator_rates(const Value* state, const Value* demand, Value* rate) const {
     rate[kRudder] = rudder.servo.rate(state[kRudder], demand[kRudder]);
     rate[kSternPlanes] = stern_planes.servo.rate(state[kSternPlanes], demand[kSternPlanes]);
     rate[kPropeller] = propeller.shaft.rate(state[kPropeller], demand[kPropeller]);
   }
 
   template <class Value>
-  AUVEST_INLINE void limit_actuators(Value* state) const {
+  void limit_actuators(Value* state) const {
     state[kRudder] = rudder.servo.limited(state[kRudder]);
     state[kSternPlanes] = stern_planes.servo.limited(state[kSternPlanes]);
     state[kPropeller] = propeller.shaft.limited(state[kPropeller]);
