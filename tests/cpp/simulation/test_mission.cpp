@@ -255,6 +255,23 @@ TEST_CASE("mission: late fixes are taken at their own time by the model-aided fi
   CHECK(fly_runs(stale, 6).position > fresh + 0.3);
 }
 
+TEST_CASE("mission: the interval policy decides when to ask") {
+  MissionScenario s = mission_source(MissionSource::kAukfLaw, MissionTrack::kCircle);
+  double shortest = 9;
+  double longest = 0;
+  fly_mission<double>(s, 1, 0, [&](const MissionStep& step) {
+    shortest = std::fmin(shortest, step.interval_s);
+    longest = std::fmax(longest, step.interval_s);
+  });
+  CHECK(shortest < 0.3);
+  CHECK(longest > 0.7);
+  // A wider budget asks less often.
+  s = mission_source(MissionSource::kAukfBudget, MissionTrack::kCircle);
+  const double tight = fly_mission<double>(s, 1, 0).interval_s;
+  s.interval.budget.params.position_sigma_m *= 1.3;
+  CHECK(fly_mission<double>(s, 1, 0).interval_s > 1.3 * tight);
+}
+
 TEST_CASE("mission: lost fixes are asked for again") {
   MissionScenario s = mission_source(MissionSource::kModelAidedCrab, MissionTrack::kCircle);
   s.usbl_timing.dropout = 0.5;
