@@ -267,7 +267,7 @@ def _range_record(steps: int) -> bytes:
 
 
 def _vehicle_record(template: str) -> bytes:
-    """A mission's readings; a torpedo's commands; demands on an ROV, one of four out of reach."""
+    """Return readings of a mission, commands of a torpedo, or demands on an ROV, some too large."""
     if template == "mission":
         record = MissionRecord(name="arcs", arc_m=15.0, seconds=130.0)
         told = b"".join(row.tobytes() for row in record.readings)
@@ -577,6 +577,7 @@ def vehicle_page(rows: list[Row]) -> list[str]:
     """Return the lines of the page on the vehicle: a period of a mission."""
     cycles = {row.program: row.cycles_median or 0 for row in rows}
     control = cycles["guidance_control"]
+    verdict = "met" if control <= MAX_GUIDANCE_CONTROL else "**not met**"
     plain = sum(cycles[name] for name in PERIOD_PARTS)
     fixed = plain + cycles["model_aided_update"]
     period = 16e6 * PERIOD_S
@@ -584,19 +585,18 @@ def vehicle_page(rows: list[Row]) -> list[str]:
         "",
         "## What a vehicle takes",
         "",
-        "Ten times a second: `heading_filter`, `model_aided_predict` (EKF of dead reckoning with the",
-        "current in its state, IGG and the recovery), `model_aided_update` where there is a fix, and",
-        "`guidance_control`: two legs of a plan and the arc between them, crab feed-forward, and the",
-        "autopilot of heading, speed, depth and pitch. The four are one program of which a part is",
-        "counted; the largest step of `guidance_control` is the one that switches from an arc to a",
-        "leg. `hull3` is the torpedo in the plane, `hull6` in six degrees of freedom, one checked",
-        "step; `rov_allocation` gives a demand to eight thrusters by priority, one of four out of",
-        "reach, and `rov_thrust_inverse` finds the eight inputs by Newton's method.",
+        "Ten times a second: `heading_filter`, `model_aided_predict` (EKF of dead reckoning with",
+        "the current in its state, IGG and the recovery), `model_aided_update` where there is a",
+        "fix, and `guidance_control`: two legs of a plan and the arc between them, crab",
+        "feed-forward, and the autopilot of heading, speed, depth and pitch. The four are one",
+        "program of which a part is counted; the largest step of `guidance_control` is one that",
+        "switches the leg. `hull3` is the torpedo in the plane, `hull6` in six degrees of freedom,",
+        "one checked step; `rov_allocation` gives a demand to eight thrusters by priority, one of",
+        "four out of reach, and `rov_thrust_inverse` finds the eight inputs by Newton's method.",
         "",
-        f"Guidance and control: {control:,} cycles in the median, {MAX_GUIDANCE_CONTROL:,} asked for"
-        f" ({'met' if control <= MAX_GUIDANCE_CONTROL else '**not met**'}). A period without a fix",
-        f"takes {plain:,} cycles, {plain / period:.1%} of it, and one with a fix {fixed:,}, "
-        f"{fixed / period:.1%}.",
+        f"Guidance and control: {control:,} cycles in the median; asked {MAX_GUIDANCE_CONTROL:,}:",
+        f"{verdict}. All parts but the fix take {plain:,} cycles, {plain / period:.1%} of a period,",
+        f"and with a fix {fixed:,}, {fixed / period:.1%}.",
     ]
 
 

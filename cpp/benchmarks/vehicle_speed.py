@@ -56,12 +56,13 @@ PAGE = """# Speed of a hull
 Made by `make bench`. One RK4 step of the torpedo `remus100` in six degrees of freedom: added mass,
 Coriolis, lift and drag, cross flow, fading linear damping, restoring, fins and propeller with their
 lags, a current; one thread. NumPy: the textbook's vectors and matrices, one hull. Numba: the same
-in scalars, for double and for float32, its parameters compiled in; the mass matrix and its inverse
-come at run time, as they do here, or every product with a 0 of this hull is left out of the program
-("own zeros left out": another hull is another program, and that is not compared). The lanes are
-{runs} runs at once, one program per instruction set (cpp/benchmarks/hull_step.cpp, chosen when it is
-compiled), and have the bits of the scalar program in float. The times are the processor's, medians
-of rounds in which all take their turn; only the ratios travel to another machine.
+in scalars, for double and for float32, its parameters compiled in. Its mass matrix and the inverse
+come at run time, as they do here; or every product with a 0 of this hull is left out of the
+program ("own zeros left out"), which is then a program for this hull alone, and has no target. The
+lanes are as many runs at once as a register holds, one program per instruction set
+(cpp/benchmarks/hull_step.cpp, chosen when it is compiled), and have the bits of the scalar program
+in float. The times are the processor's, medians of rounds in which all take their turn; only the
+ratios travel to another machine.
 
 | hull | ns per step and run |
 | --- | ---: |
@@ -137,8 +138,8 @@ def fly_numpy(x: Floats, command: Floats, current: Floats, h: float, steps: int)
                 -np.cross(momentum[:3], nu[:3]) - np.cross(momentum[3:], nu[3:]),
             ]
         )
-        turned = [0, -a[2] * w * roll, a[1] * v * roll, 0]
-        coriolis += np.array(turned + [(a[3] - a[5]) * roll * r, (a[4] - a[3]) * roll * q])
+        pitch, yaw = (a[3] - a[5]) * roll * r, (a[4] - a[3]) * roll * q
+        coriolis += np.array([0, -a[2] * w * roll, a[1] * v * roll, 0, pitch, yaw])
         speed = np.sqrt(nu[:3] @ nu[:3])
         tau = -linear * nu
         tau[:3] *= np.exp(-damping["fading_s_m"] * speed)
@@ -483,7 +484,6 @@ def main() -> int:
         Check("auvest, float32 / its lanes", ratio("auvest, float32", widest), target=TARGET_LANES),
     ]
     text = PAGE.format(
-        runs=RUNS,
         times="\n".join(f"| {name} | {np.median(found):,.3g} |" for name, found in times.items()),
         margin=f"{MARGIN:.0%}".replace("%", " %"),
         ratios=ratio_table(checks),
