@@ -293,8 +293,9 @@ def _pilot_record() -> bytes:
         if pilot.wants_fix():
             pilot.asked()
             world.ask()
-            ((*fix, _),) = world.take_fixes()
-            pilot.update(*fix, 0.0)
+            ((range_m, bearing_rad, _),) = world.take_fixes()
+            pilot.update(range_m, bearing_rad, 0.0)
+            fix = [range_m, bearing_rad]
         rows.append([*readings, *fix])
         world.advance(pilot.steer()[1:], PERIOD_S, (k + 1) * PERIOD_S)
     return np.concatenate([start, np.ravel(rows), [np.nan]]).astype("<f4").tobytes()
@@ -568,7 +569,6 @@ def page(rows: list[Row]) -> str:
 
 
 #: What the vehicle's own part of a period is made of; cycles that were asked for, in the median.
-PERIOD_S = 0.1
 PERIOD_PARTS = ("heading_filter", "model_aided_predict", "guidance_control")
 MAX_GUIDANCE_CONTROL = 20_000
 
@@ -595,7 +595,7 @@ def vehicle_page(rows: list[Row]) -> list[str]:
         "four out of reach, and `rov_thrust_inverse` finds the eight inputs by Newton's method.",
         "",
         f"Guidance and control: {control:,} cycles in the median; asked {MAX_GUIDANCE_CONTROL:,}:",
-        f"{verdict}. All parts but the fix take {plain:,} cycles, {plain / period:.1%} of a period,",
+        f"{verdict}. All but the fix take {plain:,} cycles, {plain / period:.1%} of a period,",
         f"and with a fix {fixed:,}, {fixed / period:.1%}.",
     ]
 

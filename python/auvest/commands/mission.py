@@ -26,7 +26,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from threading import Event
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import typer
@@ -36,7 +36,6 @@ from auvest.board import BoardError
 from auvest.commands import options
 from auvest.commands.console import Terminal, table
 from auvest.commands.exit_codes import ExitCode
-from auvest.commands.files import write_csv
 from auvest.commands.options import WORLD, finite, fraction, option, refuse_given
 from auvest.commands.session import Floats, Session
 from auvest.commands.simulate_mission import mean_and_error
@@ -52,6 +51,9 @@ from auvest.simulation.vehicle_in_the_loop import (
     fly_on_desk,
     fly_simulated,
 )
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 #: Without a line for this long, s, the board is taken for lost.
 SILENCE_S = 10.0
@@ -156,12 +158,11 @@ def command(
 
     beside = compare(plan, flights)
     values = measures(flights, beside)
-    with terminal.writing(output):
-        files = {"samples": write_csv(output / "samples.csv", _samples(flights[0]))}
-        files["runs"] = write_csv(output / "runs.csv", beside)
-        if not no_figure:
-            files["figure"] = _draw(output / "figure.png", flights[0], source)
-    session.report(values, files, _table(values, source))
+    session.write_csv("samples", _samples(flights[0]))
+    session.write_csv("runs", beside)
+    if not no_figure:
+        session.draw(_figure, flights[0], source)
+    session.report(values, _table(values, source))
     if len(flights) > 1:
         terminal.result(_runs_table(beside))
     lost = f"{session.trouble}; the samples until then are kept" if session.trouble else ""
@@ -322,7 +323,7 @@ def _samples(chip: ChipFlight) -> dict[str, Floats]:
     return {**columns, **dict(zip(names, command.T, strict=True))}
 
 
-def _draw(path: Path, chip: ChipFlight, source: str) -> Path:
+def _figure(chip: ChipFlight, source: str) -> Figure:
     from auvest import plots  # here, because matplotlib takes long to import
 
     columns = _samples(chip)
@@ -355,7 +356,7 @@ def _draw(path: Path, chip: ChipFlight, source: str) -> Path:
     panels[-1].set_xlabel("time / s")
     for axes in panels:
         plots.style(axes)
-    return plots.save(figure, path)
+    return figure
 
 
 def _table(values: dict[str, Any], source: str) -> Table:
