@@ -495,10 +495,11 @@ def vehicle_page(rows: list[Row]) -> list[str]:
     """Return the lines of the page on the vehicle: a period of a mission."""
     cycles = {row.program: row.cycles_median or 0 for row in rows}
     control = cycles["guidance_control"]
-    verdict = "met" if control <= MAX_GUIDANCE_CONTROL else "**not met**"
     plain = sum(cycles[name] for name in PERIOD_PARTS)
     fixed = plain + cycles["model_aided_update"]
+    limit = MAX_GUIDANCE_CONTROL
     period = 16e6 * PERIOD_S
+    verdict = "met" if control <= limit else "**not met**"
     return [
         "",
         "## What a vehicle takes",
@@ -512,8 +513,8 @@ def vehicle_page(rows: list[Row]) -> list[str]:
         "one checked step; `rov_allocation` gives a demand to eight thrusters by priority, one of",
         "four out of reach, and `rov_thrust_inverse` finds the eight inputs by Newton's method.",
         "",
-        f"Guidance and control: {control:,} cycles in the median; asked {MAX_GUIDANCE_CONTROL:,}:",
-        f"{verdict}. All parts but the fix take {plain:,} cycles, {plain / period:.1%} of a period,",
+        f"Guidance and control: {control:,} cycles in the median, asked {limit:,}: {verdict}.",
+        f"All parts but the fix take {plain:,} cycles, {plain / period:.1%} of a period,",
         f"and with a fix {fixed:,}, {fixed / period:.1%}.",
     ]
 
