@@ -577,10 +577,11 @@ def vehicle_page(rows: list[Row]) -> list[str]:
     """Return the lines of the page on the vehicle: a period of a mission."""
     cycles = {row.program: row.cycles_median or 0 for row in rows}
     control = cycles["guidance_control"]
-    verdict = "met" if control <= MAX_GUIDANCE_CONTROL else "**not met**"
     plain = sum(cycles[name] for name in PERIOD_PARTS)
     fixed = plain + cycles["model_aided_update"]
+    limit = MAX_GUIDANCE_CONTROL
     period = 16e6 * PERIOD_S
+    verdict = "met" if control <= limit else "**not met**"
     return [
         "",
         "## What a vehicle takes",

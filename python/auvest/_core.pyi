@@ -38,6 +38,8 @@ class Status(_Enum):
     not_positive_definite: ClassVar[Status]
     alpha_too_small: ClassVar[Status]
     overflow: ClassVar[Status]
+    unstable_step: ClassVar[Status]
+    steep_pitch: ClassVar[Status]
     __members__: ClassVar[dict[str, Status]]
 
 class StatusError(ValueError):
