@@ -1,6 +1,8 @@
 // The guidance laws: closed forms, where they come to rest in a current, and what they refuse.
 #include <doctest/doctest.h>
 
+#include "close.hpp"
+
 #include <cmath>
 #include <initializer_list>
 #include <limits>
@@ -85,7 +87,7 @@ TEST_CASE_TEMPLATE("laws: on a curve the feed-forward is the yaw rate that follo
   GuidanceCommand<Scalar> command;
   REQUIRE(law.update(point_at<Scalar>(1, 2, -0.025), Scalar(1.5), Scalar(0.1), command) ==
           Status::kOk);
-  CHECK(double(command.rate_rad_s) == doctest::Approx(-0.0375).epsilon(1e-6));
+  CHECK(double(command.rate_rad_s) == close_to(-0.0375, 1e-6));
 }
 
 TEST_CASE_TEMPLATE("integral and adaptive laws: their memories follow their equations", Scalar,
@@ -160,7 +162,7 @@ TEST_CASE(
   // 0.
   auvest::AdaptiveLineOfSight<double> law;
   const double u = 1.5, w = std::sqrt(u * 0.008), zeta = u / 10 / (2 * w);
-  CHECK(zeta == doctest::Approx(0.685).epsilon(1e-3));
+  CHECK(zeta == close_to(0.685, 1e-3));
   GuidanceCommand<double> command;
   double e = 1e-4;
   const double dt = 1e-3;

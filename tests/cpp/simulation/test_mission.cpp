@@ -1,6 +1,8 @@
 // The closed loop: what it gives without noise to the digit, and with noise within its statistics.
 #include <doctest/doctest.h>
 
+#include "close.hpp"
+
 #include <cmath>
 #include <cstdint>
 #include <initializer_list>
@@ -87,7 +89,7 @@ TEST_CASE(
     const MissionResult r = fly_mission<double>(s, 1, 0);
     REQUIRE(r.status == Status::kOk);
     CHECK(r.finished);
-    CHECK(r.settled_rms_m == doctest::Approx(beside).epsilon(0.05));
+    CHECK(r.settled_rms_m == close_to(beside, 0.05));
   }
   s.guidance = MissionGuidance::kIntegral;
   const MissionResult r = fly_mission<double>(s, 1, 0);

@@ -1,6 +1,8 @@
 // The simulated sensors: what they read, when, and the statistics of their errors.
 #include <doctest/doctest.h>
 
+#include "close.hpp"
+
 #include <cmath>
 #include <initializer_list>
 #include <vector>
@@ -59,32 +61,32 @@ TEST_CASE("sensors: white errors have the stated size, five standard errors wide
   compass.bias_rad = 0;
   statistics(compass, 0, mean, deviation);
   CHECK(std::fabs(mean - 1) < 5 * 0.5 * kDegree / std::sqrt(20000.0));
-  CHECK(deviation == doctest::Approx(0.5 * kDegree).epsilon(0.03));
+  CHECK(deviation == close_to(0.5 * kDegree, 0.03));
   for (int i = 0; i < 3; ++i) {
     statistics(auvest::GyroDevice(), i, mean, deviation);
     CHECK(std::fabs(mean - 0.01 * (i + 1)) < 5 * 0.1 * kDegree / std::sqrt(20000.0));
-    CHECK(deviation == doctest::Approx(0.1 * kDegree).epsilon(0.03));
+    CHECK(deviation == close_to(0.1 * kDegree, 0.03));
     statistics(auvest::DvlDevice(), i, mean, deviation);
     CHECK(std::fabs(mean - truth_at(0).ground[i]) < 5 * 0.006 / std::sqrt(20000.0));
-    CHECK(deviation == doctest::Approx(0.006).epsilon(0.03));
+    CHECK(deviation == close_to(0.006, 0.03));
   }
   statistics(auvest::DepthDevice(), 0, mean, deviation);
   CHECK(std::fabs(mean - 5) < 5 * 0.02 / std::sqrt(20000.0));
-  CHECK(deviation == doctest::Approx(0.02).epsilon(0.03));
+  CHECK(deviation == close_to(0.02, 0.03));
   for (int i = 0; i < 2; ++i) {
     statistics(auvest::LogDevice(), i, mean, deviation);
     CHECK(std::fabs(mean - truth_at(0).water[i]) < 5 * 0.05 / std::sqrt(20000.0));
-    CHECK(deviation == doctest::Approx(0.05).epsilon(0.03));
+    CHECK(deviation == close_to(0.05, 0.03));
   }
   statistics(auvest::UsblDevice(), 0, mean, deviation);
   CHECK(std::fabs(mean - 50) < 5 * 0.3 / std::sqrt(20000.0));
-  CHECK(deviation == doctest::Approx(0.3).epsilon(0.03));
+  CHECK(deviation == close_to(0.3, 0.03));
   statistics(auvest::UsblDevice(), 1, mean, deviation);
   CHECK(std::fabs(mean - std::atan2(40, 30)) < 5 * kDegree / std::sqrt(20000.0));
-  CHECK(deviation == doctest::Approx(kDegree).epsilon(0.03));
+  CHECK(deviation == close_to(kDegree, 0.03));
   statistics(auvest::AcousticRangeDevice(), 0, mean, deviation);
   CHECK(std::fabs(mean - 50) < 5 / std::sqrt(20000.0));
-  CHECK(deviation == doctest::Approx(1).epsilon(0.03));
+  CHECK(deviation == close_to(1, 0.03));
 }
 
 /// The one reading of a device without white noise.
@@ -106,20 +108,18 @@ TEST_CASE("sensors: systematic errors, one by one") {
   compass.soft_iron_rad[1] = 0.04;
   const double iron =
       0.01 * std::sin(1) + 0.02 * std::cos(1) + 0.03 * std::sin(2) + 0.04 * std::cos(2);
-  CHECK(read_once(compass).value[0] == doctest::Approx(1 + iron).epsilon(1e-12));
+  CHECK(read_once(compass).value[0] == close_to(1 + iron, 1e-12));
 
   auvest::LogDevice log;
   log.noise_m_s = 0;
   log.scale = 0.02;
-  CHECK(read_once(log).value[0] == doctest::Approx(1.53).epsilon(1e-12));
+  CHECK(read_once(log).value[0] == close_to(1.53, 1e-12));
 
   auvest::DvlDevice dvl;
   dvl.noise_m_s = 0;
   dvl.misalignment_rad = 0.1;
-  CHECK(read_once(dvl).value[0] ==
-        doctest::Approx(1.6 * std::cos(0.1) + 0.1 * std::sin(0.1)).epsilon(1e-12));
-  CHECK(read_once(dvl).value[1] ==
-        doctest::Approx(0.1 * std::cos(0.1) - 1.6 * std::sin(0.1)).epsilon(1e-12));
+  CHECK(read_once(dvl).value[0] == close_to(1.6 * std::cos(0.1) + 0.1 * std::sin(0.1), 1e-12));
+  CHECK(read_once(dvl).value[1] == close_to(0.1 * std::cos(0.1) - 1.6 * std::sin(0.1), 1e-12));
   dvl.misalignment_rad = 0;
   dvl.bottom_track = false;
   CHECK(read_once(dvl).value[0] == 1.5);
@@ -127,14 +127,14 @@ TEST_CASE("sensors: systematic errors, one by one") {
   auvest::UsblDevice usbl;
   usbl.noise_m = usbl.noise_rad = 0;
   usbl.relative = true;
-  CHECK(read_once(usbl).value[1] == doctest::Approx(std::atan2(40, 30) - 1).epsilon(1e-12));
+  CHECK(read_once(usbl).value[1] == close_to(std::atan2(40, 30) - 1, 1e-12));
 
   auvest::AcousticRangeDevice range;
   range.noise_m = 0;
   range.sound_scale = 0.01;
   range.exchange_s = 0.75;
   const Reading<1> reading = read_once(range);
-  CHECK(reading.value[0] == doctest::Approx(50.5).epsilon(1e-12));
+  CHECK(reading.value[0] == close_to(50.5, 1e-12));
   CHECK(reading.valid_s == 2);
   CHECK(reading.arrival_s == 2.75);
 }
@@ -155,7 +155,7 @@ TEST_CASE("sensors: the offset of a run is drawn once, and is another in the nex
     }
     sum += (first - 1) * (first - 1);
   }
-  CHECK(std::sqrt(sum / 2000) == doctest::Approx(kDegree).epsilon(0.08));
+  CHECK(std::sqrt(sum / 2000) == close_to(kDegree, 0.08));
 }
 
 TEST_CASE("sensors: a gyro's bias walks") {
@@ -172,7 +172,7 @@ TEST_CASE("sensors: a gyro's bias walks") {
     }
     squares += (reading.value[2] - 0.03) * (reading.value[2] - 0.03);
   }
-  CHECK(std::sqrt(squares / 500) == doctest::Approx(1e-4 * 10).epsilon(0.15));
+  CHECK(std::sqrt(squares / 500) == close_to(1e-4 * 10, 0.15));
 }
 
 TEST_CASE("sensors: outliers are late, by an exponential, as often as stated") {
@@ -193,8 +193,8 @@ TEST_CASE("sensors: outliers are late, by an exponential, as often as stated") {
       sum += late;
     }
   }
-  CHECK(outliers == doctest::Approx(2000).epsilon(0.12));  // five standard deviations
-  CHECK(sum / outliers == doctest::Approx(20).epsilon(0.12));
+  CHECK(outliers == close_to(2000, 0.12));  // five standard deviations
+  CHECK(sum / outliers == close_to(20, 0.12));
 }
 
 TEST_CASE("sensors: an answer takes its time: valid on its way out, known when it is back") {
@@ -207,11 +207,10 @@ TEST_CASE("sensors: an answer takes its time: valid on its way out, known when i
   const double delay = 50.0 / 1500;
   CHECK(!sensor.take(2 + 2 * delay - 1e-3, reading));
   REQUIRE(sensor.take(2 + 2 * delay, reading));
-  CHECK(reading.valid_s == doctest::Approx(2 + delay).epsilon(1e-12));
-  CHECK(reading.arrival_s == doctest::Approx(2 + 2 * delay).epsilon(1e-12));
+  CHECK(reading.valid_s == close_to(2 + delay, 1e-12));
+  CHECK(reading.arrival_s == close_to(2 + 2 * delay, 1e-12));
   // Where it then is: at 3 m/s north and 4 m/s west.
-  CHECK(reading.value[0] ==
-        doctest::Approx(std::hypot(30 + 3 * delay, 40 - 4 * delay)).epsilon(1e-12));
+  CHECK(reading.value[0] == close_to(std::hypot(30 + 3 * delay, 40 - 4 * delay), 1e-12));
 }
 
 TEST_CASE("sensors: clock, latency and order of arrival") {
@@ -256,7 +255,7 @@ TEST_CASE("sensors: lost readings, and no lock of the Doppler log, leave the oth
       ++lost;
     }
   }
-  CHECK(lost == doctest::Approx(3000).epsilon(0.08));
+  CHECK(lost == close_to(3000, 0.08));
 
   for (const double seabed : {5.5, 5.8, 94.0, 96.0}) {  // the vehicle is at 5 m
     auvest::DvlDevice dvl;
