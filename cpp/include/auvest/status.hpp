@@ -35,15 +35,15 @@ inline const char* describe(Status status) {
     case Status::kBadParameter:
       return "a parameter lies outside its stated range";
     case Status::kNotPositiveDefinite:
-      return "the covariance, or a hull's mass matrix, is not symmetric positive definite";
+      return "the covariance is not symmetric positive definite";
     case Status::kAlphaTooSmall:
       return "alpha is too small for a model without closed-form deviations in this precision";
     case Status::kOverflow:
       return "the result would not be finite";
     case Status::kUnstableStep:
-      return "the time step is longer than the largest stable one";
+      return "the time step is unstable";
     case Status::kSteepPitch:
-      return "pitch is beyond 80 degrees, where Euler angles fail";
+      return "pitch is beyond 80 degrees";
   }
   return "unknown status";
 }
