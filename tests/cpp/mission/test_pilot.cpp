@@ -151,7 +151,7 @@ TEST_CASE_TEMPLATE("pilot: it resumes with empty integrals at its own heading", 
   using Pilot = auvest::Pilot<Scalar>;
   Pilot pilot = started<Pilot>(settings<Scalar>());
   auto readings = steady<Scalar>();
-  readings.depth_m = 3;  // 2 m too high for 2 s: the integral of the depth is filled
+  readings.depth_m = Scalar(4.5);  // 0.5 m too high for 2 s: the integral of the depth is filled
   for (int k = 0; k < 20; ++k) step(pilot, readings);
   readings.heard = 15 & ~auvest::kGyroHeard;
   for (int k = 0; k < 20; ++k) step(pilot, readings);
