@@ -350,7 +350,7 @@ def _stations() -> Rows:
 def all_records() -> tuple[Record, ...]:
     """All records, the long mission first."""
     long = MissionRecord(name="mission", speed_m_s=1.0)
-    arcs = {"arc_m": 15.0, "seconds": 130.0}
+    arcs = MissionRecord(name="arcs", arc_m=15.0, seconds=130.0)
     commands = long.rows["command"]
     rest = [20.0, 20.0, 5.0, *np.zeros(12)]
     plane = [20.0, 20.0, *np.zeros(7)]
@@ -358,17 +358,17 @@ def all_records() -> tuple[Record, ...]:
     return (
         long,
         MissionRecord(name="mission-circle", track="circle", seconds=120.0, seed=2),
-        MissionRecord(name="mission-adaptive", law="adaptive", kernel="hampel", seed=3, **arcs),
-        MissionRecord(name="mission-line-of-sight", law="line-of-sight", seed=4, **arcs),
-        MissionRecord(name="mission-integral", law="integral", kernel="huber", seed=5, **arcs),
-        MissionRecord(
+        replace(arcs, name="mission-adaptive", law="adaptive", kernel="hampel", seed=3),
+        replace(arcs, name="mission-line-of-sight", law="line-of-sight", seed=4),
+        replace(arcs, name="mission-integral", law="integral", kernel="huber", seed=5),
+        replace(
+            arcs,
             name="mission-vector-field",
             law="vector-field",
             kernel="unit",
             rejections=0,
             outliers=0.0,
             seed=6,
-            **arcs,
         ),
         HullRecord(name="hull6", freedom=6, method="rk4", commands=commands, start=_f4(rest)),
         HullRecord(name="hull3", freedom=3, method="rk4", commands=commands, start=_f4(plane)),
