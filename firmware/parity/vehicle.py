@@ -358,17 +358,17 @@ def all_records() -> tuple[Record, ...]:
     return (
         long,
         MissionRecord(name="mission-circle", track="circle", seconds=120.0, seed=2),
-        MissionRecord(name="mission-adaptive", law="adaptive", kernel="hampel", seed=3, **arcs),
-        MissionRecord(name="mission-line-of-sight", law="line-of-sight", seed=4, **arcs),
-        MissionRecord(name="mission-integral", law="integral", kernel="huber", seed=5, **arcs),
-        MissionRecord(
+        replace(arcs, name="mission-adaptive", law="adaptive", kernel="hampel", seed=3),
+        replace(arcs, name="mission-line-of-sight", law="line-of-sight", seed=4),
+        replace(arcs, name="mission-integral", law="integral", kernel="huber", seed=5),
+        replace(
+            arcs,
             name="mission-vector-field",
             law="vector-field",
             kernel="unit",
             rejections=0,
             outliers=0.0,
             seed=6,
-            **arcs,
         ),
         HullRecord(name="hull6", freedom=6, method="rk4", commands=commands, start=_f4(rest)),
         HullRecord(name="hull3", freedom=3, method="rk4", commands=commands, start=_f4(plane)),
