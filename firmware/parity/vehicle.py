@@ -350,7 +350,7 @@ def _stations() -> Rows:
 def all_records() -> tuple[Record, ...]:
     """All records, the long mission first."""
     long = MissionRecord(name="mission", speed_m_s=1.0)
-    arcs: dict[str, Any] = {"arc_m": 15.0, "seconds": 130.0}
+    arcs = MissionRecord(name="arcs", arc_m=15.0, seconds=130.0)
     commands = long.rows["command"]
     rest = [20.0, 20.0, 5.0, *np.zeros(12)]
     plane = [20.0, 20.0, *np.zeros(7)]
