@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from auvest.filters._base import GaussianFilter, Residual, Sensors
-from auvest.filters.ckf import Ckf
 from auvest.filters.ekf import Ekf, RobustEkf
 from auvest.filters.results import Report, RunResult
 from auvest.filters.ukf import Aukf, RobustUkf, Ukf
 
 __all__ = [
     "Aukf",
-    "Ckf",
     "Ekf",
     "GaussianFilter",
     "Report",
