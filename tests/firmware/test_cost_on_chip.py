@@ -118,6 +118,7 @@ REGISTRY = [
     ("robust-ekf", "WhiteAcceleration", (*PLANE, "BodyVelocity")),
     ("robust-ukf", "WhiteAcceleration(axes=3)", SPACE),
     ("ckf", "WhiteAcceleration(axes=3)", SPACE),
+    ("robust-ekf", "SpeedHeadingCurrent", PLANE),
     ("ekf", "ConstantAcceleration", PLANE),
     ("aukf", "ConstantAcceleration(discretisation='euler')", PLANE),
 ]
