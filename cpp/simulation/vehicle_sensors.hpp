@@ -32,9 +32,9 @@ struct VehicleTruth {
 /// One reading of N numbers.
 template <int N>
 struct Reading {
-  double value[N];
-  double valid_s;    ///< what was read was so at this time
-  double arrival_s;  ///< and is known to the vehicle from this time on
+  double value[N] = {};
+  double valid_s = 0;    ///< what was read was so at this time
+  double arrival_s = 0;  ///< and is known to the vehicle from this time on
 };
 
 /// When a sensor reads, and how its readings travel.
