@@ -212,18 +212,9 @@ class Recording:
 
 def command(
     ctx: typer.Context,
-    port: Annotated[
-        str | None, typer.Option(help="Serial port of the board, like /dev/ttyACM0 or COM3.")
-    ] = None,
-    baud: Annotated[int, typer.Option(min=300, help="Baud rate of --port.")] = 115200,
-    simulator: Annotated[
-        Path | None,
-        typer.Option(
-            exists=True,
-            dir_okay=False,
-            help="The compiled sketch (.elf), run on a simulated board.",
-        ),
-    ] = None,
+    port: options.Port = None,
+    baud: options.Baud = 115200,
+    simulator: options.Simulator = None,
     steps: Annotated[
         int | None,
         typer.Option(
@@ -254,8 +245,7 @@ def command(
 ) -> None:
     """Record; the help text is the module's."""
     terminal = Terminal(as_json=as_json, quiet=quiet)
-    if (port is None) == (simulator is None):
-        raise typer.BadParameter("give one of the two.", param_hint="'--port' / '--simulator'")
+    options.one_board(port, simulator)
     played = simulator is not None or play_sonar
     if simulator is not None:
         steps = steps or paper_aukf.STEPS

@@ -36,9 +36,9 @@ from auvest.board import BoardError
 from auvest.commands import options
 from auvest.commands.console import Terminal, table
 from auvest.commands.exit_codes import ExitCode
-from auvest.commands.options import WORLD, finite, fraction, option, refuse_given
+from auvest.commands.options import option, refuse_given
 from auvest.commands.session import Floats, Session
-from auvest.commands.simulate_mission import mean_and_error
+from auvest.commands.simulate_mission import COMPASS_BIAS_DEG, mean_and_error
 from auvest.simulation import mission
 from auvest.simulation.mission import Mission
 from auvest.simulation.vehicle_in_the_loop import (
@@ -62,18 +62,9 @@ _MISSION = Mission()
 
 def command(
     ctx: typer.Context,
-    port: Annotated[
-        str | None, typer.Option(help="Serial port of the board, like /dev/ttyACM0 or COM3.")
-    ] = None,
-    baud: Annotated[int, typer.Option(min=300, help="Baud rate of --port.")] = 115200,
-    simulator: Annotated[
-        Path | None,
-        typer.Option(
-            exists=True,
-            dir_okay=False,
-            help="The compiled sketch (.elf), run on a simulated board.",
-        ),
-    ] = None,
+    port: options.Port = None,
+    baud: options.Baud = 115200,
+    simulator: options.Simulator = None,
     duration: Annotated[
         float | None,
         typer.Option(
@@ -82,25 +73,12 @@ def command(
             show_default="to the end of the plan",
         ),
     ] = None,
-    current: Annotated[
-        float, option(WORLD, "Speed of the current, m/s.", check=options.not_negative)
-    ] = _MISSION.current_m_s,
-    current_direction: Annotated[
-        float | None,
-        option(
-            WORLD,
-            "Where it flows to, degrees from north; default: drawn for each run.",
-            check=finite,
-        ),
-    ] = None,
-    outliers: Annotated[float, option(WORLD, "Share of late ranges.", check=fraction)] = 0.0,
-    latency: Annotated[
-        float, option(WORLD, "Delay of a fix, s.", check=options.not_negative)
-    ] = 0.0,
-    dropout: Annotated[float, option(WORLD, "Share of fixes that are lost.", check=fraction)] = 0.0,
-    compass_bias: Annotated[
-        float, option(WORLD, "Its standard deviation, degrees.", check=options.not_negative)
-    ] = math.degrees(_MISSION.compass_bias_rad),
+    current: options.Current = _MISSION.current_m_s,
+    current_direction: options.CurrentDirection = None,
+    outliers: options.FixOutliers = 0.0,
+    latency: options.FixLatency = 0.0,
+    dropout: options.FixDropout = 0.0,
+    compass_bias: options.CompassBias = COMPASS_BIAS_DEG,
     runs: Annotated[
         int, option(options.MONTE_CARLO, "Runs on the simulated board.", min=1, max=1000)
     ] = 1,
@@ -113,8 +91,7 @@ def command(
 ) -> None:
     """Fly; the help text is the module's."""
     terminal = Terminal(as_json=as_json, quiet=quiet)
-    if (port is None) == (simulator is None):
-        raise typer.BadParameter("give one of the two.", param_hint="'--port' / '--simulator'")
+    options.one_board(port, simulator)
     if simulator is not None:
         refuse_given(ctx, ("baud",), "belongs to --port.")
     else:

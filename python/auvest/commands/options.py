@@ -26,6 +26,12 @@ def refuse_given(ctx: typer.Context, names: tuple[str, ...], why: str) -> None:
             raise typer.BadParameter(why, param_hint=f"'--{name.replace('_', '-')}'")
 
 
+def one_board(port: str | None, simulator: Path | None) -> None:
+    """Refuse to run on no board, and on two."""
+    if (port is None) == (simulator is None):
+        raise typer.BadParameter("give one of the two.", param_hint="'--port' / '--simulator'")
+
+
 def _check(holds: Callable[[float], bool], expected: str) -> Callable[[float | None], float | None]:
     """Make an option callback: the number, if one was given, must be what is expected."""
 
@@ -105,4 +111,42 @@ RangeNoise = Annotated[
 ]
 BearingNoise = Annotated[
     float, option(WORLD, "Scale of the bearing noise, rad.", "--bearing-noise", check=positive)
+]
+
+# The board that runs a sketch: `capture` and `mission`.
+Port = Annotated[
+    str | None,
+    typer.Option("--port", help="Serial port of the board, like /dev/ttyACM0 or COM3."),
+]
+Baud = Annotated[int, typer.Option("--baud", min=300, help="Baud rate of --port.")]
+Simulator = Annotated[
+    Path | None,
+    typer.Option(
+        "--simulator",
+        exists=True,
+        dir_okay=False,
+        help="The compiled sketch (.elf), run on a simulated board.",
+    ),
+]
+
+# The sea and the fixes of a mission: `simulate mission` and `mission`.
+Current = Annotated[
+    float, option(WORLD, "Speed of the current, m/s.", "--current", check=not_negative)
+]
+CurrentDirection = Annotated[
+    float | None,
+    option(
+        WORLD,
+        "Where it flows to, degrees from north; default: drawn for each run.",
+        "--current-direction",
+        check=finite,
+    ),
+]
+FixOutliers = Annotated[float, option(WORLD, "Share of late ranges.", "--outliers", check=fraction)]
+FixLatency = Annotated[float, option(WORLD, "Delay of a fix, s.", "--latency", check=not_negative)]
+FixDropout = Annotated[
+    float, option(WORLD, "Share of fixes that are lost.", "--dropout", check=fraction)
+]
+CompassBias = Annotated[
+    float, option(WORLD, "Its standard deviation, degrees.", "--compass-bias", check=not_negative)
 ]

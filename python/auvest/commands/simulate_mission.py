@@ -26,7 +26,7 @@ from rich.table import Table
 from auvest import CovarianceBudget, FixedInterval, MahalanobisInterval, RejectionStreak
 from auvest.commands import options
 from auvest.commands.console import Terminal, table
-from auvest.commands.options import FILTER, WORLD, finite, fraction, option, positive
+from auvest.commands.options import FILTER, WORLD, option, positive
 from auvest.commands.session import Session, failure, mean_over_runs
 from auvest.intervals import IntervalPolicy
 from auvest.kernels import KernelName
@@ -38,29 +38,18 @@ if TYPE_CHECKING:
 
 _VEHICLE = "Vehicle"
 _MISSION = Mission()
+#: Default of --compass-bias, degrees.
+COMPASS_BIAS_DEG = math.degrees(_MISSION.compass_bias_rad)
 
 
 def command(
     track: Annotated[TrackKind, option(WORLD, "lawnmower: four lanes; circle.")] = "lawnmower",
-    current: Annotated[
-        float, option(WORLD, "Speed of the current, m/s.", check=options.not_negative)
-    ] = _MISSION.current_m_s,
-    current_direction: Annotated[
-        float | None,
-        option(
-            WORLD,
-            "Where it flows to, degrees from north; default: drawn for each run.",
-            check=finite,
-        ),
-    ] = None,
-    outliers: Annotated[float, option(WORLD, "Share of late ranges.", check=fraction)] = 0.0,
-    latency: Annotated[
-        float, option(WORLD, "Delay of a fix, s.", check=options.not_negative)
-    ] = 0.0,
-    dropout: Annotated[float, option(WORLD, "Share of fixes that are lost.", check=fraction)] = 0.0,
-    compass_bias: Annotated[
-        float, option(WORLD, "Its standard deviation, degrees.", check=options.not_negative)
-    ] = math.degrees(_MISSION.compass_bias_rad),
+    current: options.Current = _MISSION.current_m_s,
+    current_direction: options.CurrentDirection = None,
+    outliers: options.FixOutliers = 0.0,
+    latency: options.FixLatency = 0.0,
+    dropout: options.FixDropout = 0.0,
+    compass_bias: options.CompassBias = COMPASS_BIAS_DEG,
     degrees_of_freedom: Annotated[
         int, option(_VEHICLE, "Of the hull: 6, 5, 4 or 3.", min=3, max=6)
     ] = 6,
