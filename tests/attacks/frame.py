@@ -136,14 +136,14 @@ def run_apart(attack: Attack, amount: int, seed: int) -> Result:
         total.counts += found.counts
         total.times += found.times
         total.failures = {**found.failures, **total.failures}
-        total.cases += found.cases
         total.seconds += found.seconds
         if ended == "":
+            total.cases += found.cases
             break
         lost = worker.number.value
         text = attack.text(numbered(attack, seed, lost))
         total.fail(ended, f"# seed {seed}, case {lost}\n{text}")
-        total.cases += 1
+        total.cases += lost - first + 1
         first = lost + 1
     return total
 
@@ -156,14 +156,15 @@ class _Worker:
     ) -> None:
         context = multiprocessing.get_context("fork")
         self.number, self._queue = context.Value("q", first), context.SimpleQueue()
-        self.latest, self._unit, self._amount = Result(), attack.unit, amount
+        self._done = context.Value("q", 0)
+        self.latest, self._unit = Result(), attack.unit
 
         def work() -> None:
             told = shown = time.monotonic()
 
             def tell(number: int, result: Result) -> None:
                 nonlocal told, shown
-                self.number.value = number
+                self.number.value, self._done.value = number, result.counts[attack.unit]
                 now = time.monotonic()
                 if now - told > _TELLS_S:
                     told = now
@@ -197,12 +198,14 @@ class _Worker:
                     raise RuntimeError(f"the attack itself failed\n{said}")
                 return ""
             if not self._process.is_alive() and self._queue.empty():
+                self.latest.counts[self._unit] = self._done.value
                 return f"crash: the process ended with {self._process.exitcode}"
             if self.number.value != seen:
                 seen, since = self.number.value, time.monotonic()
             elif time.monotonic() - since > HANGS_S:
                 self._process.kill()
                 self._process.join()
+                self.latest.counts[self._unit] = self._done.value
                 return f"hang: longer than {HANGS_S:.0f} s"
             time.sleep(0.05)
 
