@@ -311,7 +311,10 @@ class Gaussian {
     if (what == 7) {
       twin_ = make();
       say("restore");
-      if (twin_->restore(before) != Status::kOk) broken("a saved state is refused", name_);
+      if (twin_->restore(before) != Status::kOk) {
+        no_belief("a saved state is refused", before.P, name_);
+        twin_.reset();
+      }
       return;
     }
     if (what <= 2) {

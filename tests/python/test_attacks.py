@@ -19,6 +19,7 @@ KNOWN = (
     r"(EkfSlat|Slatf|SlatfJoint|DeadReckoning|Outage)( \(master\))?: not finite after ok",
     # Measurements that are 1e7 times as precise as what they correct.
     r"\w+: (variance of 0|P indefinite) after ok",
+    r"\w+\.(restore|loads): its own state is refused",
     r"Pilot_float32.start: changed by a refusal",
     # A missing echo, and nobody said whose the other one is.
     r"\w+\.(update|step): AssertionError",
