@@ -4,12 +4,19 @@
 // Host side: the truth is kept in double, whatever the filter's scalar.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <vector>
 
+#include "auvest/filters/ekf.hpp"
+#include "auvest/filters/gaussian_sum.hpp"
+#include "auvest/filters/ukf.hpp"
 #include "auvest/math/basic.hpp"
 #include "auvest/math/random.hpp"
 #include "auvest/math/trigonometry.hpp"
 #include "auvest/models/leader_range.hpp"
+#include "auvest/models/speed_heading.hpp"
+#include "auvest/robust/rejection_streak.hpp"
 #include "auvest/status.hpp"
 #include "auvest/types.hpp"
 
@@ -109,9 +116,7 @@ class StartWorld {
   }
 
  private:
-  double uniform(double low, double high) {
-    return low + (high - low) * random_.uniform<double>();
-  }
+  double uniform(double low, double high) { return low + (high - low) * random_.uniform<double>(); }
 
   StartScenario scenario_;
   math::Random random_;
@@ -156,8 +161,7 @@ inline Status run_unknown_start(Filter& filter, const StartScenario& scenario, s
     if (k == scenario.bad_step) filter.predict(static_cast<Scalar>(scenario.bad_step_s), input);
     double there[2];
     Vector<Scalar, 1> z;
-    z(0) = static_cast<Scalar>(
-        world.range(static_cast<int>(k) % scenario.leaders, there));
+    z(0) = static_cast<Scalar>(world.range(static_cast<int>(k) % scenario.leaders, there));
     sensor.params.leader_x_m = static_cast<Scalar>(there[0]);
     sensor.params.leader_y_m = static_cast<Scalar>(there[1]);
     const auto correction = filter.update(z, sensor);
@@ -188,5 +192,104 @@ struct StartError {
   bool wrong() const { return distance2 > 28.7 && sigma_m < 5; }     ///< beyond 5 sigma
   bool back() const { return distance2 < 18.4207 && sigma_m < 5; }   ///< inside 99.99 %
 };
+
+/// Shares of the runs after 10, 30 and 100 ranges.
+struct StartShares {
+  double right[3] = {0, 0, 0};
+  double wrong[3] = {0, 0, 0};
+  double wrong_settled[3] = {0, 0, 0};
+  double settled[3] = {0, 0, 0};
+  int refused = 0;  ///< runs that ended early: none should
+};
+
+/// `runs` runs, each with a copy of `filter`.
+template <class Filter>
+StartShares start_shares(const Filter& filter, const StartScenario& scenario, int runs,
+                         std::uint64_t seed) {
+  StartShares shares;
+  for (int run = 0; run < runs; ++run) {
+    Filter own = filter;
+    const auto look = [&shares](std::uint32_t range, const Filter& now, const StartWorld& world,
+                                const RobustCorrection<typename Filter::Scalar, 1>&) {
+      const int at = range == 10 ? 0 : range == 30 ? 1 : range == 100 ? 2 : -1;
+      if (at < 0) return;
+      const StartError error(now, world);
+      const bool settled = now.convergence() == Convergence::kSettled;
+      shares.right[at] += error.right() ? 1 : 0;
+      shares.wrong[at] += error.wrong() ? 1 : 0;
+      shares.wrong_settled[at] += error.wrong() && settled ? 1 : 0;
+      shares.settled[at] += settled ? 1 : 0;
+    };
+    const auto number = static_cast<std::uint64_t>(run);
+    if (run_unknown_start(own, scenario, seed, number, 100, look) != Status::kOk) ++shares.refused;
+  }
+  for (int at = 0; at < 3; ++at) {
+    shares.right[at] /= runs;
+    shares.wrong[at] /= runs;
+    shares.wrong_settled[at] /= runs;
+    shares.settled[at] /= runs;
+  }
+  return shares;
+}
+
+/// How many ranges it took to come back, to stay for five; 101 stands for never.
+struct StartReturn {
+  int median, most;  ///< half and 90 % of the runs were back
+  double never;      ///< share of the runs
+  int refused = 0;
+};
+
+/// As above; counted from `scenario.bad_step` where that is not 0.
+template <class Filter>
+StartReturn start_return(const Filter& filter, const StartScenario& scenario, int runs,
+                         std::uint64_t seed) {
+  std::vector<int> after(static_cast<std::size_t>(runs));
+  StartReturn result;
+  for (int run = 0; run < runs; ++run) {
+    Filter own = filter;
+    const int event = static_cast<int>(scenario.bad_step);
+    const int from = event == 0 ? 1 : event;
+    int streak = 0;
+    int back = 101;
+    const auto look = [&](std::uint32_t range, const Filter& now, const StartWorld& world,
+                          const RobustCorrection<typename Filter::Scalar, 1>&) {
+      const int since = static_cast<int>(range) - from + 1;
+      if (since < 1) return;
+      streak = StartError(now, world).back() ? streak + 1 : 0;
+      if (streak == 5 && since - 4 < back) back = since - 4;
+    };
+    const auto ranges = static_cast<std::uint32_t>(from + 103);
+    const auto number = static_cast<std::uint64_t>(run);
+    if (run_unknown_start(own, scenario, seed, number, ranges, look) != Status::kOk) {
+      ++result.refused;
+    }
+    after[static_cast<std::size_t>(run)] = back;
+  }
+  std::sort(after.begin(), after.end());
+  result.median = after[static_cast<std::size_t>(runs / 2)];
+  result.most = after[static_cast<std::size_t>(runs - 1 - runs / 10)];
+  result.never =
+      static_cast<double>(std::count(after.begin(), after.end(), 101)) / static_cast<double>(runs);
+  return result;
+}
+
+/// A robust EKF or UKF of the craft's position that may not know where it begins.
+template <class Scalar, template <class> class Filter, template <class> class Kernel, int K>
+GaussianSum<
+    Robust<Filter<SpeedHeading<Scalar>>, RobustUpdate<Kernel<Scalar>, RejectionStreak<Scalar>>>, K>
+start_filter(int components = K) {
+  using Process = SpeedHeading<Scalar>;
+  using Inside = Robust<Filter<Process>, RobustUpdate<Kernel<Scalar>, RejectionStreak<Scalar>>>;
+  typename GaussianSum<Inside, K>::Params params;
+  params.components = static_cast<std::uint8_t>(components);
+  return GaussianSum<Inside, K>(Inside(Filter<Process>(Process())), params);
+}
+
+/// A share less three standard errors of its difference from one that `runs` runs give: a share of
+/// 0 or 1 is not known exactly either.
+inline double start_bound(double share, int of_runs, int runs) {
+  const double p = (share * of_runs + 2) / (of_runs + 4);
+  return share - 3 * math::sqrt(p * (1 - p) * (1.0 / of_runs + 1.0 / runs));
+}
 
 }  // namespace auvest

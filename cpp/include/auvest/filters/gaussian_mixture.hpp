@@ -175,7 +175,8 @@ struct GaussianMixture {
 
   /// Replaces all by the product of N(m, P) = `prior` with a ring of `count` components
   ///
-  ///     c_k = b + z (1 - s^2 / 2) u_k,   R_k = (sigma^2 + (s^2 z)^2 / 2) u_k u_k' + (s z)^2 t_k t_k'
+  ///     c_k = b + z (1 - s^2 / 2) u_k,   R_k = (sigma^2 + (s^2 z)^2 / 2) u_k u_k' + (s z)^2 t_k
+  ///     t_k'
   ///
   /// with s = pi / count: what a range z says about the position. In the frame of u_k and t_k R is
   /// diagonal, and with P = [p_uu p_ut; p_ut p_tt] and S = P + R the posterior R - R S^-1 R is
@@ -185,7 +186,8 @@ struct GaussianMixture {
   ///
   /// where no digit is lost, however wide the prior. Further states follow by their regression on
   /// the position. False if P is not positive definite: nothing has changed then.
-  AUVEST_OUTLINE bool ring(const Belief<Scalar, N>& prior, const RangeCircle<Scalar>& circle, int count) {
+  AUVEST_OUTLINE bool ring(const Belief<Scalar, N>& prior, const RangeCircle<Scalar>& circle,
+                           int count) {
     using math::larger;
     using math::sqrt;
     Matrix<Scalar, 2, 2> root;
@@ -210,8 +212,8 @@ struct GaussianMixture {
       const Scalar uy = sine * first_x + cosine * first_y;
       const Scalar p_uu = variance_along(prior.P, ux, uy);
       const Scalar p_tt = variance_along(prior.P, -uy, ux);
-      const Scalar p_ut = ux * uy * (prior.P(1, 1) - prior.P(0, 0)) +
-                          (ux * ux - uy * uy) * prior.P(1, 0);
+      const Scalar p_ut =
+          ux * uy * (prior.P(1, 1) - prior.P(0, 0)) + (ux * ux - uy * uy) * prior.P(1, 0);
       const Scalar s_tt = p_tt + r_t;
       const Scalar q = p_ut / s_tt;
       const Scalar a = larger(p_uu - q * p_ut, math::pivot_floor(p_uu));
@@ -221,8 +223,8 @@ struct GaussianMixture {
       const Scalar d_t = -(dy * ux - dx * uy);
       const Scalar y_u = (d_u - q * d_t) / s_uu;  // S^-1 (c - m)
       const Scalar y_t = (d_t - p_ut * y_u) / s_tt;
-      const Scalar log_weight = Scalar(-0.5) * (d_u * y_u + d_t * y_t + math::log(s_uu) +
-                                                math::log(s_tt));
+      const Scalar log_weight =
+          Scalar(-0.5) * (d_u * y_u + d_t * y_t + math::log(s_uu) + math::log(s_tt));
       weight[k] = larger(Scalar(-1e30), log_weight);
       if (k == 0 || weight[k] > most) most = weight[k];
 

@@ -63,8 +63,8 @@ constexpr int default_components() {
 template <class Scalar, int N, int K>
 struct GaussianSumState {
   GaussianMixture<Scalar, N, K> mixture;  ///< its components count where there are several
-  std::uint8_t accepted = 0;  ///< ranges since it was not converged or ambiguous, to 6
-  Scalar bend = Scalar(0);    ///< 3 sqrt(2) sigma z of the last range: a wider variance bends
+  std::uint8_t accepted = 0;              ///< ranges since it was not converged or ambiguous, to 6
+  Scalar bend = Scalar(0);  ///< 3 sqrt(2) sigma z of the last range: a wider variance bends
 };
 
 template <class Robust_, int K_ = default_components<typename Robust_::Scalar>()>
@@ -79,7 +79,7 @@ class GaussianSum : public Robust_ {
   using typename Base::State;
   static constexpr int kStates = Base::kStates;
   static constexpr int kMost = K_;
-  static_assert(K_ == 1 || (K_ >= 8 && K_ <= 255), "a ring of fewer components has gaps");
+  static_assert(K_ >= 8 && K_ <= 255, "a ring of fewer components has gaps");
   static_assert(kStates >= 2, "the first two states are the position");
   using Mixture = GaussianMixture<Scalar, kStates, kMost>;
   using SumState = GaussianSumState<Scalar, kStates, kMost>;
@@ -167,8 +167,8 @@ class GaussianSum : public Robust_ {
     const bool wide = bends(whole.P, state_.bend);
     if (size() > 1) {
       const Scalar within = state_.mixture.trace_within();
-      const bool places = wide ? !(within > state_.bend) && state_.mixture.few(4)
-                               : trace - within > within;
+      const bool places =
+          wide ? !(within > state_.bend) && state_.mixture.few(4) : trace - within > within;
       if (places) return Convergence::kAmbiguous;
     }
     if (wide) return Convergence::kNotConverged;
@@ -331,9 +331,8 @@ class GaussianSum : public Robust_ {
     // What a plain update would report, before the circle was seen to bend.
     using math::sqrt;
     const Scalar range = sqrt(dx * dx + dy * dy);
-    const Scalar along = range > Scalar(0)
-                             ? variance_along(whole.P, dx / range, dy / range)
-                             : Scalar(0.5) * (whole.P(0, 0) + whole.P(1, 1));
+    const Scalar along = range > Scalar(0) ? variance_along(whole.P, dx / range, dy / range)
+                                           : Scalar(0.5) * (whole.P(0, 0) + whole.P(1, 1));
     correction.clear(Status::kOk);
     correction.innovation(0) = circle.radius - range;
     correction.S(0, 0) = along + circle.sigma * circle.sigma;
@@ -364,8 +363,8 @@ class GaussianSum : public Robust_ {
         const Scalar v = range > Scalar(0) ? variance_along(belief.P, -dy / range, dx / range)
                                            : LongAxis<Scalar>(belief.P).variance;
         // At least sigma: nearer than that v > 9 R is the stronger condition.
-        const Scalar near = math::larger(
-            circle.sigma, range < circle.radius ? range : circle.radius);
+        const Scalar near =
+            math::larger(circle.sigma, range < circle.radius ? range : circle.radius);
         const Scalar ratio = v / near;
         if (!(v > noise) || !(ratio * circle.radius > bend)) continue;
         if (weight(k) * ratio > most) {
