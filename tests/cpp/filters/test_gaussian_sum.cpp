@@ -541,7 +541,6 @@ struct Placed {
 TEST_CASE("turning, shifting and mirroring the scene does so to the result") {
   const Placed scenes[] = {{0, 0, 0, false}, {1.1, -300, 40, false}, {-2, 5, 900, true}};
   const double stations[2][2] = {{0, 0}, {120, 10}};
-  auto original = auvest::start_filter<double, auvest::Ekf, Igg, 32>();
   for (const Placed& scene : scenes) {
     auto filter = auvest::start_filter<double, auvest::Ekf, Igg, 32>();
     auto reference = auvest::start_filter<double, auvest::Ekf, Igg, 32>();

@@ -152,24 +152,34 @@ struct GaussianMixture {
   }
 
   /// Merges the closest two, keeping the moments, for as long as their squared distance in their
-  /// own mean covariance is below `nearest`. Every further state counts for itself.
-  AUVEST_OUTLINE void merge(Scalar nearest) {
+  /// own mean covariance is below `limit`. Every further state counts for itself.
+  AUVEST_OUTLINE void merge(Scalar limit) {
+    Nearest nearest[K];  // of each, among those behind it
+    for (int i = 0; i < size; ++i) nearest[i] = nearest_of(i, limit);
     while (size > 1) {
-      Scalar least = nearest;
       int first = 0;
-      int second = 0;
+      for (int i = 1; i < size; ++i) {
+        if (nearest[i].distance2 < nearest[first].distance2) first = i;
+      }
+      if (!(nearest[first].distance2 < limit)) return;
+      const int second = nearest[first].index;
+      join(first, second);
+      // Only what was near to one of the two is looked for anew.
+      for (int i = second; i < size; ++i) nearest[i] = nearest[i + 1];
       for (int i = 0; i < size; ++i) {
-        for (int j = i + 1; j < size; ++j) {
-          const Scalar apart = distance2(component[i], component[j], least);
-          if (apart < least) {
-            least = apart;
-            first = i;
-            second = j;
+        Nearest& known = nearest[i];
+        const int index = known.index;
+        if (index > second) --known.index;
+        if (i == first || index == first || index == second) {
+          known = nearest_of(i, limit);
+        } else if (i < first) {
+          const Scalar apart = distance2(component[i], component[first], limit);
+          if (apart < known.distance2 || (apart == known.distance2 && first < known.index)) {
+            known.distance2 = apart;
+            known.index = static_cast<std::uint8_t>(first);
           }
         }
       }
-      if (second == 0) return;
-      join(first, second);
     }
   }
 
@@ -268,6 +278,24 @@ struct GaussianMixture {
   }
 
  private:
+  struct Nearest {
+    Scalar distance2;    ///< `limit` where none is nearer
+    std::uint8_t index;  ///< its own then
+  };
+
+  /// The lower index where two are as near.
+  AUVEST_OUTLINE Nearest nearest_of(int i, Scalar limit) const {
+    Nearest nearest = {limit, static_cast<std::uint8_t>(i)};
+    for (int j = i + 1; j < size; ++j) {
+      const Scalar apart = distance2(component[i], component[j], limit);
+      if (apart < nearest.distance2) {
+        nearest.distance2 = apart;
+        nearest.index = static_cast<std::uint8_t>(j);
+      }
+    }
+    return nearest;
+  }
+
   /// The states behind the position, once that has become `one`'s: as [UKF S5].
   static void carry(const Belief<Scalar, N>& prior,
                     const Matrix<Scalar, math::other_states(N, 2), 2>& slope,
@@ -290,15 +318,15 @@ struct GaussianMixture {
   }
 
   /// d' ((P_i + P_j) / 2)^-1 d of the position, and d^2 over the mean variance of every further
-  /// state; or some number that is no less than `least`, if that is.
-  static Scalar distance2(const Belief<Scalar, N>& one, const Belief<Scalar, N>& other,
-                          Scalar least) {
+  /// state; `limit` where it is no less than that.
+  AUVEST_OUTLINE static Scalar distance2(const Belief<Scalar, N>& one,
+                                         const Belief<Scalar, N>& other, Scalar limit) {
     const Scalar dx = one.x(0) - other.x(0);
     const Scalar dy = one.x(1) - other.x(1);
     const Scalar s_xx = one.P(0, 0) + other.P(0, 0);
     const Scalar s_yy = one.P(1, 1) + other.P(1, 1);
     // No direction is wider than the trace says: most pairs are done with here.
-    if (Scalar(2) * (dx * dx + dy * dy) > least * (s_xx + s_yy)) return least;
+    if (dx * dx + dy * dy > Scalar(0.5) * limit * (s_xx + s_yy)) return limit;
     const Scalar s_yx = one.P(1, 0) + other.P(1, 0);
     const Scalar q = s_yx / s_xx;
     const Scalar rest = math::larger(s_yy - q * s_yx, math::pivot_floor(s_yy));
@@ -308,7 +336,8 @@ struct GaussianMixture {
       const Scalar d = one.x(i) - other.x(i);
       sum = sum + d * (d / (one.P(i, i) + other.P(i, i)));
     }
-    return sum + sum;
+    sum = sum + sum;
+    return sum < limit ? sum : limit;
   }
 
   /// i becomes i and j together; those behind j move up.

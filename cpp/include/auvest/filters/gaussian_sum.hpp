@@ -225,22 +225,33 @@ class GaussianSum : public Robust_ {
 
   // ---- Prediction -------------------------------------------------------------------------------
 
-  /// The displacement and its noise are the same for all.
+  /// The displacement and its noise are the same for all: those of a belief of zeros.
   Status predict_all(Scalar dt, Translates<true>) {
-    const Status status = Base::predict(dt);  // of the moments
-    if (status != Status::kOk) return status;
-    BeliefType step;
+    BeliefType& step = this->belief_in_place();
+    BeliefType whole;
+    math::copy(step, whole);
     math::set_zero(step.x);
     math::set_zero(step.P);
-    this->predict_belief(step, dt);
-    for (int k = 0; k < size(); ++k) {
-      BeliefType& one = state_.mixture.component[k];
-      for (int i = 0; i < kStates; ++i) {
-        one.x(i) = one.x(i) + step.x(i);
-        for (int j = 0; j <= i; ++j) one.P(i, j) = one.P(i, j) + step.P(i, j);
-      }
+    Status status = Base::predict(dt);
+    BeliefType moved;
+    math::copy(whole, moved);
+    if (status == Status::kOk) {
+      move(step, moved);
+      if (!math::all_finite(moved)) status = Status::kOverflow;
     }
+    if (status == Status::kOk) {
+      for (int k = 0; k < size(); ++k) move(step, state_.mixture.component[k]);
+      math::copy(moved, whole);
+    }
+    math::copy(whole, step);
     return status;
+  }
+
+  AUVEST_OUTLINE static void move(const BeliefType& step, BeliefType& belief) {
+    for (int i = 0; i < kStates; ++i) {
+      belief.x(i) = belief.x(i) + step.x(i);
+      for (int j = 0; j <= i; ++j) belief.P(i, j) = belief.P(i, j) + step.P(i, j);
+    }
   }
 
   /// Twice: the first time to see that none is refused.
@@ -297,12 +308,13 @@ class GaussianSum : public Robust_ {
 
   /// True if no square of a length, in sigmas of the range, leaves the format.
   bool within_range(const RangeCircle<Scalar>& circle) const {
+    const Scalar per_sigma = Scalar(8) / circle.sigma;
     for (int k = 0; k < size(); ++k) {
       const BeliefType& belief = component(k);
       const Scalar dx = belief.x(0) - circle.centre[0];
       const Scalar dy = belief.x(1) - circle.centre[1];
       const Scalar length = math::absolute(dx) + math::absolute(dy) + circle.radius;
-      const Scalar sigmas = Scalar(8) * (length / circle.sigma);
+      const Scalar sigmas = length * per_sigma;
       const Scalar square = Scalar(64) * (length * length) + (belief.P(0, 0) + belief.P(1, 1));
       if (!math::is_finite(sigmas * sigmas) || !math::is_finite(square)) return false;
     }
@@ -349,33 +361,41 @@ class GaussianSum : public Robust_ {
 
   /// Rule 2.
   void refine(const RangeCircle<Scalar>& circle, Scalar bend) {
-    using math::sqrt;
-    const Scalar noise = Scalar(9) * (circle.sigma * circle.sigma);
+    if (size() == params_.components) return;
+    Scalar bent[kMost];
+    for (int k = 0; k < size(); ++k) bent[k] = bend_of(component(k), circle, bend);
     while (size() < params_.components) {
       int chosen = -1;
       Scalar most = Scalar(0);
       for (int k = 0; k < size(); ++k) {
-        const BeliefType& belief = component(k);
-        if (!(belief.P(0, 0) + belief.P(1, 1) > noise)) continue;
-        const Scalar dx = belief.x(0) - circle.centre[0];
-        const Scalar dy = belief.x(1) - circle.centre[1];
-        const Scalar range = sqrt(dx * dx + dy * dy);
-        const Scalar v = range > Scalar(0) ? variance_along(belief.P, -dy / range, dx / range)
-                                           : LongAxis<Scalar>(belief.P).variance;
-        // At least sigma: nearer than that v > 9 R is the stronger condition.
-        const Scalar near =
-            math::larger(circle.sigma, range < circle.radius ? range : circle.radius);
-        const Scalar ratio = v / near;
-        if (!(v > noise) || !(ratio * circle.radius > bend)) continue;
-        if (weight(k) * ratio > most) {
-          most = weight(k) * ratio;
+        if (weight(k) * bent[k] > most) {
+          most = weight(k) * bent[k];
           chosen = k;
         }
       }
       if (chosen < 0) return;
       if (size() == 1) state_.mixture.assign(this->belief());
       state_.mixture.split(chosen);
+      bent[chosen] = bend_of(component(chosen), circle, bend);
+      bent[size() - 1] = bend_of(component(size() - 1), circle, bend);
     }
+  }
+
+  /// v over the distance where the circle bends within this component, 0 where it does not.
+  AUVEST_OUTLINE static Scalar bend_of(const BeliefType& belief, const RangeCircle<Scalar>& circle,
+                                       Scalar bend) {
+    using math::sqrt;
+    const Scalar noise = Scalar(9) * (circle.sigma * circle.sigma);
+    if (!(belief.P(0, 0) + belief.P(1, 1) > noise)) return Scalar(0);
+    const Scalar dx = belief.x(0) - circle.centre[0];
+    const Scalar dy = belief.x(1) - circle.centre[1];
+    const Scalar range = sqrt(dx * dx + dy * dy);
+    const Scalar v = range > Scalar(0) ? variance_along(belief.P, -dy / range, dx / range)
+                                       : LongAxis<Scalar>(belief.P).variance;
+    // At least sigma: nearer than that v > 9 R is the stronger condition.
+    const Scalar near = math::larger(circle.sigma, range < circle.radius ? range : circle.radius);
+    const Scalar ratio = v / near;
+    return v > noise && ratio * circle.radius > bend ? ratio : Scalar(0);
   }
 
   /// Rule 3 for the belief in place.
