@@ -36,7 +36,8 @@ class SpeedControl : public IntegratingControl<Scalar_> {
     }
   };
 
-  explicit SpeedControl(const Params& params = Params()) : Base(valid(params)), params_(params) {}
+  explicit SpeedControl(const Params& params = Params())
+      : Base(valid(params)), params_(params), wanted_(Scalar(0)), feed_(Scalar(0)) {}
 
   /// Revolutions per second for the wanted speed from the measured one, both through the water
   /// [m/s]. On anything but kOk nothing has changed, the command neither.
@@ -50,16 +51,20 @@ class SpeedControl : public IntegratingControl<Scalar_> {
   }
 
   /// The same step without taking it: accept(step) does.
-  Status propose(Scalar wanted_m_s, Scalar speed_m_s, Scalar dt, Step& step) const {
+  Status propose(Scalar wanted_m_s, Scalar speed_m_s, Scalar dt, Step& step) {
     if (this->check() != Status::kOk) return this->check();
     if (!math::is_finite(wanted_m_s) || !math::is_finite(speed_m_s) || !math::is_finite(dt)) {
       return Status::kNotFinite;
     }
     if (dt < Scalar(0)) return Status::kTimeBackwards;
     const Scalar error = wanted_m_s - speed_m_s;
+    if (wanted_m_s != wanted_) {
+      feed_ = wanted_m_s / params_.advance_m;
+      wanted_ = wanted_m_s;
+    }
     // [CONTROL 8]
-    const Scalar wished = wanted_m_s / params_.advance_m + params_.proportional * error +
-                          params_.integral * this->integral();
+    const Scalar wished =
+        feed_ + params_.proportional * error + params_.integral * this->integral();
     return this->limit(wished, Scalar(0), params_.max_rev_s, error, true, dt, step);
   }
 
@@ -72,6 +77,8 @@ class SpeedControl : public IntegratingControl<Scalar_> {
   }
 
   Params params_;
+  Scalar wanted_;  // for which
+  Scalar feed_;    // is U / c: it rarely changes, and a chip divides slowly
 };
 
 }  // namespace AUVEST_INSTRUCTIONS
