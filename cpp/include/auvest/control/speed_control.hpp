@@ -43,20 +43,13 @@ class SpeedControl : public IntegratingControl<Scalar_> {
   /// [m/s]. On anything but kOk nothing has changed, the command neither.
   Status update(Scalar wanted_m_s, Scalar speed_m_s, Scalar dt, Scalar& rev_s) {
     Step step;
-    const Status status = propose(wanted_m_s, speed_m_s, dt, step);
-    if (status != Status::kOk) return status;
-    this->accept(step);
-    rev_s = step.command;
-    return Status::kOk;
+    return this->take(propose(wanted_m_s, speed_m_s, dt, step), step, rev_s);
   }
 
   /// The same step without taking it: accept(step) does.
   Status propose(Scalar wanted_m_s, Scalar speed_m_s, Scalar dt, Step& step) {
-    if (this->check() != Status::kOk) return this->check();
-    if (!math::is_finite(wanted_m_s) || !math::is_finite(speed_m_s) || !math::is_finite(dt)) {
-      return Status::kNotFinite;
-    }
-    if (dt < Scalar(0)) return Status::kTimeBackwards;
+    const Status status = this->admit(dt, wanted_m_s, speed_m_s);
+    if (status != Status::kOk) return status;
     const Scalar error = wanted_m_s - speed_m_s;
     if (wanted_m_s != wanted_) {
       feed_ = wanted_m_s / params_.advance_m;
