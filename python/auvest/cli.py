@@ -28,6 +28,7 @@ COMMANDS: Mapping[tuple[str, ...], str] = {
     ("import",): "Turn a published recording into logs for 'auvest replay'.",
     ("mission",): "Play the vehicle that the sketch mission steers, on a board or simulated.",
     ("replay",): "Replay recorded runs through a filter.",
+    ("version",): "Show the version, and what this build lacks.",
     ("simulate", "aukf"): (
         "Simulate the AUKF paper's scenario and show errors, intervals and consistency."
     ),
@@ -115,9 +116,9 @@ _grow()
 
 def _show_version(wanted: bool) -> None:
     if wanted:
-        from auvest.commands.version import version
+        from auvest.commands.version import lines
 
-        typer.echo(f"auvest {version()}")
+        typer.echo("\n".join(lines()))
         raise typer.Exit
 
 
