@@ -90,13 +90,17 @@ def _lazy(words: tuple[str, ...], line: str) -> type[TyperCommand]:
 
     class Lazy(TyperCommand):
         def make_context(self, *arguments: Any, **options: Any) -> Any:
+            from auvest.commands.console import discard_unpublished
+
             found = import_module(_module(words))
             real = typer.Typer(rich_markup_mode="rich", add_completion=False)
             about = (found.__doc__ or "").partition("\n\n")[2]
             about = about.replace("Examples\n--------\n", "Examples:\n\n")
             text = f"{line}\n\n{about}\n{EXIT_CODES}\n"
             real.command(self.name, help=text)(found.command)
-            return typer.main.get_command(real).make_context(*arguments, **options)
+            context = typer.main.get_command(real).make_context(*arguments, **options)
+            context.call_on_close(discard_unpublished)
+            return context
 
     return Lazy
 

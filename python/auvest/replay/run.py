@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from auvest._interrupts import HeldInterrupts
 from auvest.logs import LogFolder
 from auvest.replay import tables
 from auvest.replay.config import FilterName, Settings
@@ -112,14 +113,16 @@ def replay(
     with ExitStack() as stack:
         files = _open(folder, stack)
         try:
+            held = stack.enter_context(HeldInterrupts())
             for batch in engine.batches():
-                tally.add(batch)
-                for write in files:
-                    write(batch)
-                estimates.add(batch.estimates)
-                errors.add(batch.errors)
-                measurements.add(batch.measurements)
-                outliers.add(_outliers(batch.measurements))
+                with held:  # so that all tables and figures are of the same rows
+                    tally.add(batch)
+                    for write in files:
+                        write(batch)
+                    estimates.add(batch.estimates)
+                    errors.add(batch.errors)
+                    measurements.add(batch.measurements)
+                    outliers.add(_outliers(batch.measurements))
                 if progress is not None:
                     progress(engine.bytes_read, engine.bytes)
         except KeyboardInterrupt:
