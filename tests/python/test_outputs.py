@@ -116,7 +116,7 @@ def test_the_working_folder_is_not_replaced(
 ) -> None:
     (tmp_path / "here").mkdir()
     monkeypatch.chdir(tmp_path / "here")
-    for path in (Path("."), Path(".."), tmp_path):
+    for path in (Path(), Path(".."), tmp_path):
         with pytest.raises(OutputError, match="working folder or above it"):
             NewFolder(path, "replay", force=True)
     assert files(tmp_path) == {}
@@ -161,7 +161,7 @@ def test_an_unfinished_folder_of_somebody_else_is_refused(tmp_path: Path) -> Non
 
 def test_a_file_takes_its_name_when_it_is_whole(tmp_path: Path) -> None:
     (tmp_path / "t.csv").write_text("old")
-    with pytest.raises(KeyError), new_file(tmp_path / "t.csv", "w") as file:
+    with pytest.raises(KeyError), new_file(tmp_path / "t.csv", "w") as file:  # noqa: PT012
         file.write("ne")
         raise KeyError
     assert files(tmp_path) == {"t.csv": "old"}
@@ -169,14 +169,14 @@ def test_a_file_takes_its_name_when_it_is_whole(tmp_path: Path) -> None:
 
 def test_ctrl_c_waits_for_what_must_be_whole() -> None:
     done = []
-    with pytest.raises(KeyboardInterrupt), HeldInterrupts() as held:
+    with pytest.raises(KeyboardInterrupt), HeldInterrupts() as held:  # noqa: PT012
         for part in range(3):
             with held:
                 os.kill(os.getpid(), signal.SIGINT)
                 done.append(part)
     assert done == [0]  # to its end, and no further
     before = signal.getsignal(signal.SIGINT)
-    with pytest.raises(KeyboardInterrupt), HeldInterrupts():
+    with pytest.raises(KeyboardInterrupt), HeldInterrupts():  # noqa: PT012
         os.kill(os.getpid(), signal.SIGINT)  # outside of the inner block it acts at once
         done.append(1)
     assert done == [0]

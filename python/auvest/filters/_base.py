@@ -71,6 +71,8 @@ class GaussianFilter:
     _linearisation: ClassVar[int]
     #: Whether it asks models for their Jacobians.
     _jacobians: ClassVar[bool] = False
+    #: Of the thread that is in :meth:`run`.
+    _run: object
 
     def __init__(
         self,
