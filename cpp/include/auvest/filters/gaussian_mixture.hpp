@@ -173,7 +173,7 @@ struct GaussianMixture {
         if (i == first || index == first || index == second) {
           known = nearest_of(i, limit);
         } else if (i < first) {
-          const Scalar apart = distance2(component[i], component[first], limit);
+          const Scalar apart = distance2(i, first, limit);
           if (apart < known.distance2 || (apart == known.distance2 && first < known.index)) {
             known.distance2 = apart;
             known.index = static_cast<std::uint8_t>(first);
@@ -287,13 +287,39 @@ struct GaussianMixture {
   AUVEST_OUTLINE Nearest nearest_of(int i, Scalar limit) const {
     Nearest nearest = {limit, static_cast<std::uint8_t>(i)};
     for (int j = i + 1; j < size; ++j) {
-      const Scalar apart = distance2(component[i], component[j], limit);
+      const Scalar apart = distance2(i, j, limit);
       if (apart < nearest.distance2) {
         nearest.distance2 = apart;
         nearest.index = static_cast<std::uint8_t>(j);
       }
     }
     return nearest;
+  }
+
+  /// d' ((P_i + P_j) / 2)^-1 d of the position, and d^2 over the mean variance of every further
+  /// state; `limit` where it is no less than that.
+  AUVEST_OUTLINE Scalar distance2(int i, int j, Scalar limit) const {
+    const Belief<Scalar, N>& one = component[i];
+    const Belief<Scalar, N>& other = component[j];
+    // No direction is wider than the trace says: most pairs are done with here.
+    const Scalar s_xx = one.P(0, 0) + other.P(0, 0);
+    const Scalar s_yy = one.P(1, 1) + other.P(1, 1);
+    const Scalar reach = Scalar(0.5) * limit * (s_xx + s_yy);
+    const Scalar dx = one.x(0) - other.x(0);
+    if (dx * dx > reach) return limit;
+    const Scalar dy = one.x(1) - other.x(1);
+    if (dy * dy > reach) return limit;
+    const Scalar s_yx = one.P(1, 0) + other.P(1, 0);
+    const Scalar q = s_yx / s_xx;
+    const Scalar rest = math::larger(s_yy - q * s_yx, math::pivot_floor(s_yy));
+    const Scalar ey = dy - q * dx;
+    Scalar sum = dx * (dx / s_xx) + ey * (ey / rest);
+    for (int k = 2; k < N; ++k) {
+      const Scalar d = one.x(k) - other.x(k);
+      sum = sum + d * (d / (one.P(k, k) + other.P(k, k)));
+    }
+    sum = sum + sum;
+    return sum < limit ? sum : limit;
   }
 
   /// The states behind the position, once that has become `one`'s: as [UKF S5].
@@ -315,29 +341,6 @@ struct GaussianMixture {
       }
       one.P(i, i) = math::larger(one.P(i, i), floor);
     }
-  }
-
-  /// d' ((P_i + P_j) / 2)^-1 d of the position, and d^2 over the mean variance of every further
-  /// state; `limit` where it is no less than that.
-  AUVEST_OUTLINE static Scalar distance2(const Belief<Scalar, N>& one,
-                                         const Belief<Scalar, N>& other, Scalar limit) {
-    const Scalar dx = one.x(0) - other.x(0);
-    const Scalar dy = one.x(1) - other.x(1);
-    const Scalar s_xx = one.P(0, 0) + other.P(0, 0);
-    const Scalar s_yy = one.P(1, 1) + other.P(1, 1);
-    // No direction is wider than the trace says: most pairs are done with here.
-    if (dx * dx + dy * dy > Scalar(0.5) * limit * (s_xx + s_yy)) return limit;
-    const Scalar s_yx = one.P(1, 0) + other.P(1, 0);
-    const Scalar q = s_yx / s_xx;
-    const Scalar rest = math::larger(s_yy - q * s_yx, math::pivot_floor(s_yy));
-    const Scalar ey = dy - q * dx;
-    Scalar sum = dx * (dx / s_xx) + ey * (ey / rest);
-    for (int i = 2; i < N; ++i) {
-      const Scalar d = one.x(i) - other.x(i);
-      sum = sum + d * (d / (one.P(i, i) + other.P(i, i)));
-    }
-    sum = sum + sum;
-    return sum < limit ? sum : limit;
   }
 
   /// i becomes i and j together; those behind j move up.

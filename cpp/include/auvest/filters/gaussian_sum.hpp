@@ -12,9 +12,9 @@
 //     sight the circle bends, v > 9 R and v / (sqrt(2) min(r, z)) > 3 sigma, becomes two.
 //  3. Update. Each component by the robust update with a weight of its own. Its likelihood is
 //     bounded from below by that of an outlier: a wrong range costs nobody more than that.
-//  4. Prune components below e^-9 of the heaviest; merge the closest two while they are one place.
-//  5. Recovery, on the mixture: a range is rejected if components of more than half of the weight
+//  4. Recovery, of the mixture: a range is rejected if components of more than half of the weight
 //     reject it; what the recovery adds, it adds to all.
+//  5. Prune components below e^-9 of the heaviest; merge the closest two while they are one place.
 //
 // With n = 1 this is the filter inside, bit for bit: no rule fires while the position's sigma is
 // below 3 sigma of the range. x(), P() and belief() are the moments of the mixture. A wide belief
@@ -278,7 +278,9 @@ class GaussianSum : public Robust_ {
   template <class Model, class Report>
   Status take(const typename Model::Measurement& z, const Model& model, Report& correction,
               IsCircle<false>) {
-    return update_all(z, model, correction);
+    const Status status = update_all(z, model, correction);
+    if (status == Status::kOk && size() > 1) tidy();
+    return status;
   }
 
   template <class Model, class Report>
@@ -302,7 +304,9 @@ class GaussianSum : public Robust_ {
       }
     }
     const Status status = update_all(z, model, correction);
-    if (status == Status::kOk) count(correction, bend);
+    if (status != Status::kOk) return status;
+    if (size() > 1) tidy();
+    count(correction, bend);
     return status;
   }
 
@@ -333,7 +337,7 @@ class GaussianSum : public Robust_ {
   }
 
   template <class Report>
-  Status ring(const RangeCircle<Scalar>& circle, Scalar bend, Report& correction) {
+  AUVEST_OUTLINE Status ring(const RangeCircle<Scalar>& circle, Scalar bend, Report& correction) {
     const BeliefType& whole = this->belief();
     const Scalar dx = whole.x(0) - circle.centre[0];
     const Scalar dy = whole.x(1) - circle.centre[1];
@@ -360,7 +364,7 @@ class GaussianSum : public Robust_ {
   }
 
   /// Rule 2.
-  void refine(const RangeCircle<Scalar>& circle, Scalar bend) {
+  AUVEST_OUTLINE void refine(const RangeCircle<Scalar>& circle, Scalar bend) {
     if (size() == params_.components) return;
     Scalar bent[kMost];
     for (int k = 0; k < size(); ++k) bent[k] = bend_of(component(k), circle, bend);
@@ -417,9 +421,10 @@ class GaussianSum : public Robust_ {
     return this->correct(z, model, part, correction);
   }
 
-  /// Rules 3 to 5. On anything but kOk no component has changed.
+  /// Rules 3 and 4. On anything but kOk no component has changed.
   template <class Model, class Report>
-  Status update_all(const typename Model::Measurement& z, const Model& model, Report& correction) {
+  AUVEST_OUTLINE Status update_all(const typename Model::Measurement& z, const Model& model,
+                                   Report& correction) {
     constexpr int kSize = Model::kSize;
     constexpr int kObserved = Model::kObserved;
     Matrix<Scalar, kSize, kObserved> a;
@@ -481,33 +486,31 @@ class GaussianSum : public Robust_ {
         }
       }
     }
-    tidy();
     return Status::kOk;
   }
 
   /// The likelihood of a component in multiples of that of an outlier, which is its bound:
   /// max(exp(-t^2 / 2) / sqrt(2 pi S), share / width), number by number.
   template <class Model, class Report>
-  Scalar likelihood(const Report& report, const Model& model) const {
+  AUVEST_OUTLINE Scalar likelihood(const Report& report, const Model& model) const {
     using math::sqrt;
     const typename Model::Noise noise = model.R();
     Scalar product = Scalar(1);
     for (int m = 0; m < Model::kSize; ++m) {
       const Scalar s = report.S(m, m);
-      const Scalar t = report.innovation(m) / sqrt(s);
       // Near the station the measurement is another, and so is its noise.
       const Scalar sharp = report.near_field ? Scalar(1) : sqrt(noise(m, m) / s);
       const Scalar peak =
           Scalar(0.398942280) * (params_.outlier_width / params_.outlier_share) * sharp;
-      const Scalar fall = Scalar(-0.5) * (t * t);
+      const Scalar fall = Scalar(-0.5) * (report.innovation(m) / s * report.innovation(m));
       const Scalar value = fall > Scalar(-80) ? peak * math::exp(fall) : Scalar(0);
       product = product * math::larger(Scalar(1), value);
     }
     return product;
   }
 
-  /// Rule 4, and the moments.
-  void tidy() {
+  /// Rule 5, and the moments.
+  AUVEST_OUTLINE void tidy() {
     Mixture& mixture = state_.mixture;
     mixture.prune(Scalar(1.23409804e-4));  // e^-9
     mixture.merge(Scalar(0.5));
