@@ -51,6 +51,7 @@ class OdometrySettings:
     turn_factor: float = positive(1.0)
     turn_offset_rad_s: float = number(0.0)
     max_step_s: float = positive(0.1)  # of velocity odometry
+    gap_s: float = positive(15.0)  # a velocity holds no longer
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,7 +141,7 @@ def read_settings(path: Path) -> Settings:
         range; the message names file, section and key.
     """
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
+        document = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise ValueError(f"{path}: cannot be read: {error.strerror or error}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
