@@ -45,7 +45,7 @@ BUILD_REQUIRES = $(shell sed -nE 's/^requires = \[(.*)\]/\1/p' pyproject.toml | 
 PIP_INSTALL = $(PY) -m pip install --quiet --disable-pip-version-check
 
 # Users get the newest packages within the bounds of pyproject.toml; tests and linters run with those
-# of requirements.lock, to the byte.
+# of tests/requirements.lock, to the byte.
 .PHONY: setup setup-dev install install-editable lock
 setup: $(VENV)/.auvest-setup ## install what is missing: Debian packages to build, .venv
 setup-dev: $(VENV)/.auvest-setup-dev ## the same, with all that the tests and linters need
@@ -57,21 +57,21 @@ $(VENV)/.auvest-setup: pyproject.toml
 	test -x $(PY) || python3 -m venv $(VENV)
 	touch $@
 
-$(VENV)/.auvest-setup-dev: $(VENV)/.auvest-setup requirements.lock
+$(VENV)/.auvest-setup-dev: $(VENV)/.auvest-setup tests/requirements.lock
 	$(call apt,$(DEV_PACKAGES))
-	$(PIP_INSTALL) --require-hashes -r requirements.lock
+	$(PIP_INSTALL) --require-hashes -r tests/requirements.lock
 	touch $@
 
 $(VENV)/.auvest-build-requires: $(VENV)/.auvest-setup
 	$(PIP_INSTALL) $(foreach r,$(BUILD_REQUIRES),'$(r)')
 	touch $@
 
-lock: setup ## renew requirements.lock: the newest packages within the bounds of pyproject.toml
+lock: setup ## renew tests/requirements.lock: the newest packages within the bounds of pyproject.toml
 	test -x build/lock/bin/uv || { python3 -m venv build/lock && build/lock/bin/pip install -q uv; }
 	printf '%s\n' $(foreach r,$(BUILD_REQUIRES),'$(r)') > build/lock/build.in
 	build/lock/bin/uv pip compile --quiet --upgrade --universal --python-version 3.10 \
 	    --generate-hashes --no-annotate --custom-compile-command 'make lock' \
-	    --extra test --extra dev --output-file requirements.lock pyproject.toml build/lock/build.in
+	    --extra test --extra dev --output-file tests/requirements.lock pyproject.toml build/lock/build.in
 
 $(VENV)/.auvest-normal: $(VENV)/.auvest-build-requires $(CORE_FILES) $(shell find python -name '*.py' -o -name '*.pyi')
 	$(PIP_INSTALL) --no-build-isolation .
@@ -136,7 +136,7 @@ test-cpp-matrix: $(MATRIX) ## the C++ tests under sanitizers: clang, C++20
 .PHONY: $(PAIRS) build-release
 $(PAIRS): matrix-%: setup-dev
 	cmake -S . -B build/$@ -G Ninja --log-level=WARNING -D AUVEST_BUILD_TESTS=ON \
-	    -D AUVEST_SANITIZE=ON -D CMAKE_BUILD_TYPE=Debug -D CMAKE_CXX_FLAGS_DEBUG='-O1 -g1' \
+	    -D AUVEST_SANITIZE=ON -D CMAKE_BUILD_TYPE=Debug -D CMAKE_CXX_FLAGS_DEBUG=-g1 \
 	    -D CMAKE_CXX_COMPILER=$(if $(findstring clang,$@),clang++,g++) \
 	    -D CMAKE_CXX_STANDARD=$(lastword $(subst -, ,$@))
 	cmake --build build/$@

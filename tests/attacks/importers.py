@@ -152,7 +152,7 @@ class Importers:
                 raise Failed(f"{name}: writes a number that is none", path.name)
         try:
             log = LogFolder(folder)
-            for path in folder.iterdir():
+            for path in folder.glob("*.csv"):
                 log[path.name].whole()
         except LogError as refused:
             raise Failed(f"{name}: writes what the reader refuses", str(refused)) from None

@@ -338,7 +338,8 @@ def interrupt_after(seconds: float, command: list[str], cwd: Path) -> tuple[int,
     """Run a command, interrupt it at work, and return its exit code, stdout and stderr."""
     output = cwd / f"after-{seconds}"
     program = start_program([*command, "--output", output], cwd=cwd)
-    wait_until(output.exists, "the work has not begun", program)  # made just before it
+    part = output.with_name(f"{output.name}.unfinished")
+    wait_until(part.exists, "the work has not begun", program)  # made just before it
     time.sleep(seconds)
     program.send_signal(signal.SIGINT)
     out, err = program.communicate(timeout=PATIENCE_S)

@@ -172,7 +172,7 @@ def test_sdist_has_what_git_tracks(root, tmp_path, declared_version, run):
 
 def test_tests_run_with_the_packages_of_the_lock(root):
     """Every one that is installed here is in it, in its version."""
-    lock = (root / "requirements.lock").read_text()
+    lock = (root / "tests/requirements.lock").read_text()
     entries = re.split(r"(?m)^(?=[a-z0-9])", lock)[1:]
     assert len(entries) > 40
     locked = {}

@@ -7,7 +7,8 @@ understand comes back here, to be converted or refused in words.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, NoReturn, TypeAlias
 
 import numpy as np
@@ -17,6 +18,7 @@ from auvest import _core
 from auvest._arguments import (
     DType,
     Floats,
+    InUse,
     as_array,
     as_covariance,
     as_dtype,
@@ -31,14 +33,15 @@ from auvest._arguments import (
     require_range,
 )
 from auvest._core import Decision, Status
+from auvest._interrupts import first_slice, in_slices
 from auvest._state import describe, pack, require, unpack
-from auvest.errors import FilterError
+from auvest.errors import FilterError, Interrupted
 from auvest.filters.results import Report, RunResult
 from auvest.intervals import FixedInterval, IntervalPolicy, MahalanobisInterval, core_interval
 from auvest.kernels import Kernel, KernelName, RejectionStreak, Unit, as_kernel, core_kernel
 from auvest.models import MeasurementModel, ProcessModel, from_description
 from auvest.models._base import UNSAVED
-from auvest.models.functions import FunctionProcess, require_none_raised
+from auvest.models.functions import FunctionProcess, FunctionSensor, require_none_raised
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -68,6 +71,8 @@ class GaussianFilter:
     _linearisation: ClassVar[int]
     #: Whether it asks models for their Jacobians.
     _jacobians: ClassVar[bool] = False
+    #: Of the thread that is in :meth:`run`.
+    _run: object
 
     def __init__(
         self,
@@ -448,6 +453,9 @@ class GaussianFilter:
         FilterError
             If a row cannot be done. ``step`` names it, ``partial`` holds the results before it, and
             the filter stays at the row before.
+        Interrupted
+            After Ctrl-C, a ``KeyboardInterrupt`` within half a second: ``partial`` holds the
+            results so far, and the filter stays at their last row.
         """
         as_flag("covariance", covariance)
         handles, which = self._as_sensor_rows(sensor)
@@ -477,7 +485,20 @@ class GaussianFilter:
             "sensor": which,
         }
         before = self._before_functions()
-        done, status, columns = self._filter.run(record, handles, covariance)
+        with self._taken() as core:
+            done, status, columns, interrupted = in_slices(
+                count,
+                8 if self._slow else first_slice(),
+                lambda first, end: core.run(
+                    {
+                        name: None if column is None else column[first:end]
+                        for name, column in record.items()
+                    },
+                    handles,
+                    covariance,
+                ),
+                Status.ok,
+            )
         if status == Status.ok:
             self._require_functions_done(before)
         for name in ("P", "S") if not covariance else ():
@@ -497,7 +518,27 @@ class GaussianFilter:
             except Exception as cause:
                 raise error from cause
             raise error
+        if interrupted:
+            raise Interrupted(result)
         return result
+
+    @property
+    def _slow(self) -> bool:
+        """Whether every step calls functions of Python."""
+        models = (self._process, *self._sensors.values())
+        return any(isinstance(model, (FunctionProcess, FunctionSensor)) for model in models)
+
+    @contextmanager
+    def _taken(self) -> Iterator[_Filter[Any]]:
+        """Keep other threads out between the slices of a record too."""
+        if vars(self).setdefault("_run", token := object()) is not token:  # atomic
+            self._filter.x  # noqa: B018  (says that the filter is in use)
+        core, self._filter = self._filter, InUse()  # type: ignore[assignment]
+        try:
+            yield core
+        finally:
+            self._filter = core
+            del self._run
 
     # ---- State ----------------------------------------------------------------------------------
 

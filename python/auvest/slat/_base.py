@@ -28,7 +28,8 @@ from auvest._arguments import (
     require_range,
 )
 from auvest._core import Status
-from auvest.errors import FilterError
+from auvest._interrupts import first_slice, in_slices
+from auvest.errors import FilterError, Interrupted
 from auvest.slat.models import (
     CompassMotion,
     Master,
@@ -213,6 +214,9 @@ class Steps:
         FilterError
             If a row cannot be done. ``step`` names it, ``partial`` holds the results before it, and
             the filter stays where the step that was refused met it.
+        Interrupted
+            After Ctrl-C, a ``KeyboardInterrupt`` within half a second: ``partial`` holds the
+            results so far, and the filter stays at their last row.
         """
         device = self._as_device(sonar)
         double = np.dtype(np.float64)
@@ -245,10 +249,14 @@ class Steps:
                 numbers = self._as_numbers(None if self._deaf else master, len(echoes))
                 there = ~np.isnan(echoes[:, 0])
                 echoes, numbers, heard_at = echoes[there], numbers[there], heard_at[there]
-            out = self._core_steps.run(
-                times, readings, plan, heard_at, echoes, numbers, device, self._random
+            done, status, out, interrupted = in_slices(
+                rows,
+                first_slice(getattr(self, "particles", 1)),
+                lambda first, end: self._run_slice(
+                    slice(first, end), (times, readings, plan), (heard_at, echoes, numbers), device
+                ),
+                Status.ok,
             )
-            done = out["done"]
             width = int(out["masters"][:done].max(initial=0))
             result = SlatRun(
                 time_s=times[1 : done + 1],
@@ -261,10 +269,35 @@ class Steps:
                 log_likelihood=out["log_likelihood"][:done],
                 nis=out["nis"][:done],
             )
-            self._status = out["status"]
+            self._status = status
         if self._status != Status.ok:
             raise FilterError("run", self._status, step=done, partial=result)
+        if interrupted:
+            raise Interrupted(result)
         return result
+
+    def _run_slice(
+        self,
+        rows: slice,
+        moves: tuple[Floats, Floats, Floats],
+        heard: tuple[Floats, Floats, npt.NDArray[np.int64]],
+        device: _core._Sonar,
+    ) -> tuple[int, Status, dict[str, Any]]:
+        """Run some readings of a record, with the echoes up to the end of the last."""
+        times, readings, plan = moves
+        times = times[rows.start : rows.stop + 1]
+        # An echo at the very beginning belongs to the first reading of the record.
+        low = np.searchsorted(heard[0], times[0], "right") if rows.start else 0
+        high = np.searchsorted(heard[0], times[-1], "right")
+        out = self._core_steps.run(
+            times,
+            readings[rows],
+            plan[rows] if len(plan) else plan,
+            *(column[low:high] for column in heard),
+            device,
+            self._random,
+        )
+        return out.pop("done"), out.pop("status"), out
 
     def save(self) -> bytes:
         """Give the whole state, with that of the random numbers, for :meth:`restore`.
