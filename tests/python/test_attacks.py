@@ -23,9 +23,6 @@ KNOWN = (
     r"Pilot_float32.start: changed by a refusal",
     # A missing echo, and nobody said whose the other one is.
     r"\w+\.(update|step): AssertionError",
-    # Importers that are less strict than the reader.
-    r"\w+: (UserWarning|RuntimeWarning|IndexError|OverflowError|ValueError)",
-    r"\w+: (a refused import leaves files|writes (a number that is none|what the reader refuses))",
 )
 
 
