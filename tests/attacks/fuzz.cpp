@@ -116,12 +116,14 @@ class Bytes {
     for (int i = 0; i < N * N; ++i) p.data()[i] = numbers[std::size_t(i)];
     return p;
   }
+  /// The position's deviations are of the size of `scale`; those of other states are smaller.
   std::vector<Scalar> spread(int n, double scale) {
     const std::size_t size = std::size_t(n);
     std::vector<double> root(size * size, 0.0);
     for (std::size_t i = 0; i < size; ++i) {
-      for (std::size_t j = 0; j < i; ++j) root[i * size + j] = 0.3 * double(number(scale));
-      root[i * size + i] = double(positive(scale)) + 1e-3 * scale;
+      const double own = i < 2 ? scale : 0.03 * scale;
+      for (std::size_t j = 0; j < i; ++j) root[i * size + j] = 0.3 * double(number(own));
+      root[i * size + i] = double(positive(own)) + 0.01 * own;
     }
     std::vector<Scalar> p(size * size);
     for (std::size_t i = 0; i < size; ++i) {
