@@ -589,6 +589,9 @@ class GaussianFilter:
             raise ValueError("state is damaged: there is no such status")
         status = Status(int(arrays.pop("status")))
         self._require_interval(arrays["policy"])
+        states = len(self._process.state)
+        _require_correlations(arrays["P"], states)
+        _require_correlations(arrays["base"][states : states + states * states], states)
         events = self._remembered(arrays.pop("event_models"), arrays.pop("event_sensor"))
         report = _saved_report(arrays)
         twin = self._filter.copy()
@@ -836,6 +839,16 @@ class GaussianFilter:
             return
         require_none_raised()
         raise FilterError(action, Status(code)) from None
+
+
+def _require_correlations(saved: Floats, states: int) -> None:
+    """Refuse a covariance with a correlation beyond 1, whose elimination may leave the range."""
+    if saved.size != states * states:  # how many there are is the core's to say
+        return
+    covariance = saved.reshape(states, states).astype(np.float64)
+    sigma = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
+    if (np.abs(covariance) > 1.001 * np.outer(sigma, sigma)).any():
+        raise ValueError("state is damaged: its covariance has a correlation beyond 1")
 
 
 def _saved_report(arrays: dict[str, npt.NDArray[Any]]) -> dict[str, Any] | None:
