@@ -24,7 +24,7 @@ import numpy.typing as npt
 
 from auvest._arguments import as_integer, as_workers
 from auvest._outputs import UNFINISHED, new_file
-from auvest.errors import Interrupted
+from auvest.errors import Interrupted as Interrupted
 
 Columns: TypeAlias = dict[str, npt.NDArray[Any]]
 #: ``task(first, count)`` does the runs ``first .. first + count - 1``, without the GIL if it can.

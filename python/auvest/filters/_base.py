@@ -68,6 +68,8 @@ class GaussianFilter:
     _linearisation: ClassVar[int]
     #: Whether it asks models for their Jacobians.
     _jacobians: ClassVar[bool] = False
+    #: There while run() is at work.
+    _run: object
 
     def __init__(
         self,
