@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import math
 import sys
-import tempfile
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -115,18 +114,6 @@ class Terminal:
             )
         _being_made.append(new)
         return new
-
-    def make_folder(self, folder: Path) -> None:
-        """Make a folder to work in, before the work, so that a wrong one is known at once."""
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryFile(dir=folder):
-                pass
-        except OSError as error:
-            self.fail(
-                f"--output {folder}: cannot write there: {error.strerror or error}",
-                ExitCode.FAILED,
-            )
 
     def publish(self, new: NewFolder, *, interrupted: bool = False) -> None:
         """Give a folder of results its name, and say where a folder that was there went."""

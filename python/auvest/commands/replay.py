@@ -4,6 +4,9 @@ A LOG is a folder of CSV files, as docs/logs.md describes it and 'auvest import'
 the output folder gets a folder with the estimates, measurements and errors as CSV and Parquet, the
 track as TUM text, a figure, one self-contained HTML report and results.json.
 
+The log is checked on the way as 'auvest check' does it, and the result has a verdict: sound,
+doubtful or not to be trusted, with the reason; no truth is looked at for it.
+
 Examples
 --------
   auvest import goats14 data/goats14 logs

@@ -34,7 +34,7 @@ from auvest._arguments import (
 )
 from auvest._core import Decision, Status
 from auvest._interrupts import first_slice, in_slices
-from auvest._state import describe, pack, unpack
+from auvest._state import describe, pack, require, unpack
 from auvest.errors import FilterError, Interrupted
 from auvest.filters.results import Report, RunResult
 from auvest.intervals import FixedInterval, IntervalPolicy, MahalanobisInterval, core_interval
@@ -55,6 +55,9 @@ _UPDATE = _core.robust_update_defaults()
 _FIXED = FixedInterval()
 _UNIT = Unit()
 _REPORT = ("innovation", "S", "standardised", "weight")
+_LARGEST_REPORT = 6  # numbers of a measurement
+_STATUSES = {int(status) for status in Status.__members__.values()}
+_DECISIONS = {int(decision) for decision in Decision.__members__.values()}
 
 
 class GaussianFilter:
@@ -68,7 +71,7 @@ class GaussianFilter:
     _linearisation: ClassVar[int]
     #: Whether it asks models for their Jacobians.
     _jacobians: ClassVar[bool] = False
-    #: There while run() is at work.
+    #: Of the thread that is in :meth:`run`.
     _run: object
 
     def __init__(
@@ -581,28 +584,72 @@ class GaussianFilter:
             parameters and precision. The filter is then unchanged.
         """
         arrays = unpack(state, type(self).__name__, self._description())
+        require(arrays, self._saved_dtypes(), optional="report_")
+        if arrays["status"].shape != () or int(arrays["status"]) not in _STATUSES:
+            raise ValueError("state is damaged: there is no such status")
         status = Status(int(arrays.pop("status")))
-        models = json.loads(arrays.pop("event_models").tobytes())
-        own = {handle.description: handle for handle in self._handles.values()}
-        handles = [own.get(json.dumps(model)) or self._rebuilt(model) for model in models]
-        events = [None if k < 0 else handles[k] for k in arrays.pop("event_sensor")]
-        report: dict[str, Any] | None = None
-        if "report_nis" in arrays:
-            flags = [int(flag) for flag in arrays.pop("report_flags")]
-            report = {name: arrays.pop(f"report_{name}").ravel() for name in _REPORT}
-            report["nis"] = float(arrays.pop("report_nis"))
-            report["near_field"], report["recovered"] = bool(flags[0]), bool(flags[3])
-            report["decision"], report["iterations"] = Decision(flags[1]), flags[2]
+        self._require_interval(arrays["policy"])
+        events = self._remembered(arrays.pop("event_models"), arrays.pop("event_sensor"))
+        report = _saved_report(arrays)
+        twin = self._filter.copy()
         try:
-            self._filter.restore(arrays, events)
+            twin.restore(arrays, events)
         except _core.StatusError as error:
             raise ValueError(f"state is refused: {error}") from None
-        self._filter.set_report(report, status)
+        twin.set_report(report, status)
+        self._filter = twin
+
+    def _saved_dtypes(self) -> dict[str, npt.DTypeLike]:
+        """Give the arrays of a saved state."""
+        numbers = ("x", "P", "input", "policy", "recovery", "base", "events")
+        report = (*(f"report_{name}" for name in _REPORT), "report_nis")
+        whole = ("status", "event_sensor", "report_flags")
+        return {
+            **dict.fromkeys((*numbers, *report), self._dtype),
+            **dict.fromkeys(whole, np.dtype(np.int64)),
+            "event_models": np.dtype(np.uint8),
+        }
+
+    def _require_interval(self, saved: Floats) -> None:
+        """Refuse an interval, and a memory of the interval law, that the policy cannot have."""
+        if self._policy is None or len(saved) != 9:  # how many there are is the core's to say
+            return
+        number = self._dtype.type
+        law: dict[str, tuple[float, float]] = {}
+        if isinstance(self._policy, FixedInterval):
+            law["interval"] = (self._policy.interval_s, self._policy.interval_s)
+        else:
+            law["interval"] = (self._policy.min_s, self._policy.max_s)
+        if isinstance(self._policy, MahalanobisInterval):
+            law["tau"] = (self._policy.tau_min, self._policy.tau_max)
+            law["interval of the law"] = law["interval"]
+            law["ratio"] = (0.0, self._policy.ratio_max)
+            law["mahalanobis_squared"] = (0.0, np.inf)
+        places = ("interval", "tau", "interval of the law", "ratio", "mahalanobis_squared")
+        for name, value in zip(places, saved, strict=False):
+            low, high = law.get(name, (-np.inf, np.inf))
+            if not number(low) <= value <= number(high):
+                raise ValueError(f"state is damaged: {name} is {value}, limits {low} and {high}")
+
+    def _remembered(
+        self, models: npt.NDArray[np.uint8], sensor: npt.NDArray[np.int64]
+    ) -> list[_Sensor[Any] | None]:
+        """Give the core's sensor of each event; None where it is a prediction."""
+        try:
+            described = json.loads(models.tobytes())
+            own = {handle.description: handle for handle in self._handles.values()}
+            handles = [own.get(json.dumps(model)) or self._rebuilt(model) for model in described]
+        except (ValueError, TypeError, RecursionError) as error:
+            raise ValueError(f"state is damaged: its models cannot be made: {error}") from None
+        if sensor.ndim != 1 or ((sensor < -1) | (sensor >= len(handles))).any():
+            raise ValueError("state is damaged: an event names a sensor that is not there")
+        return [None if k < 0 else handles[k] for k in sensor]
 
     def _rebuilt(self, description: dict[str, Any]) -> _Sensor[Any]:
         model: MeasurementModel = as_instance(
             "state", from_description(description), MeasurementModel
         )
+        model.check_process(self._process)
         return model.core(len(self._process.state), self._dtype)
 
     def _description(self) -> dict[str, Any]:
@@ -789,6 +836,30 @@ class GaussianFilter:
             return
         require_none_raised()
         raise FilterError(action, Status(code)) from None
+
+
+def _saved_report(arrays: dict[str, npt.NDArray[Any]]) -> dict[str, Any] | None:
+    """Take the report out of the arrays of a saved state."""
+    if "report_nis" not in arrays:
+        return None
+    found: dict[str, Any] = {name: arrays.pop(f"report_{name}") for name in _REPORT}
+    nis, flags = arrays.pop("report_nis"), arrays.pop("report_flags")
+    size = found["innovation"].size
+    right = nis.shape == () and flags.shape == (4,) and found["S"].shape == (size, size)
+    right = right and all(found[name].shape == (size,) for name in _REPORT if name != "S")
+    if not right or not 1 <= size <= _LARGEST_REPORT or ((flags < 0) | (flags > 255)).any():
+        raise ValueError("state is damaged: its report is none")
+    if int(flags[1]) not in _DECISIONS:
+        raise ValueError("state is damaged: there is no such decision")
+    report = {name: array.ravel() for name, array in found.items()}
+    return {
+        **report,
+        "nis": float(nis),
+        "near_field": bool(flags[0]),
+        "decision": Decision(int(flags[1])),
+        "iterations": int(flags[2]),
+        "recovered": bool(flags[3]),
+    }
 
 
 def _as_sensors(sensors: Sensors, process: ProcessModel) -> dict[str, MeasurementModel]:

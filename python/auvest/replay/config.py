@@ -52,6 +52,7 @@ class OdometrySettings:
     turn_factor: float = positive(1.0)
     turn_offset_rad_s: float = number(0.0)
     max_step_s: float = positive(0.1)  # of velocity odometry
+    gap_s: float = positive(15.0)  # a velocity holds no longer
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -319,10 +319,40 @@ class Steps:
             parameters and precision; the message names what differs. The filter is then unchanged.
         """
         arrays = _state.unpack(state, type(self).__name__, self._description())
+        dtypes = {"numbers": self._dtype, "counts": np.int64, "random": np.uint32}
+        _state.require(arrays, dtypes)
         with self._exclusive:
-            self._core_steps.restore(arrays["numbers"], arrays["counts"])
-            self._random.restore(arrays["random"])
-            self._status = Status.ok
+            twin, random = self._core_steps.copy(), self._random.copy()
+            random.restore(arrays["random"])
+            twin.restore(arrays["numbers"], arrays["counts"])
+            self._require_started(twin, arrays["counts"])
+            self._require_legal(twin)
+            self._core_steps, self._random, self._status = twin, random, Status.ok
+
+    def _require_started(self, core: Any, counts: npt.NDArray[np.int64]) -> None:  # noqa: ARG002
+        """Refuse the state of a filter that was never started: there is none such in Python."""
+        if counts[0] != 1:
+            raise ValueError("state is damaged: it is that of a filter that was not started")
+
+    def _require_legal(self, core: Any) -> None:
+        """Refuse a restored filter of the core whose beliefs are none."""
+        # Rounding may leave a covariance that filters go on with not quite positive.
+        slack = 1e-3 if self._dtype == np.dtype(np.float32) else 1e-9
+        beliefs = {"slave": core.slave()} if self._has_slave(core) else {}
+        beliefs |= {f"master {n}": core.master(n) for n in range(core.masters)}
+        for name, (x, covariance) in beliefs.items():
+            variances = np.diagonal(covariance).astype(np.float64)
+            legal = np.isfinite(x).all() and np.isfinite(covariance).all()
+            legal = legal and bool((variances >= 0).all())
+            if legal:
+                sigma = np.sqrt(np.where(variances > 0, variances, 1.0))
+                correlation = covariance / np.outer(sigma, sigma)
+                legal = np.linalg.eigvalsh(correlation.astype(np.float64))[0] >= -slack
+            if not legal:
+                raise ValueError(f"state is damaged: the belief of the {name} is none")
+
+    def _has_slave(self, core: Any) -> bool:  # noqa: ARG002
+        return True
 
     def __getstate__(self) -> dict[str, Any]:
         in_the_core = ("_core_steps", "_device", "_random", "_exclusive")
@@ -634,6 +664,14 @@ class ParticleSlatFilter(SlatFilter):
             "resampling": as_kind("resampling", resampling, get_args(Resampling)),
         }
         super().__init__(x0, P0, seed=seed, settings={**own, **settings}, **options)
+
+    def _require_legal(self, core: Any) -> None:
+        super()._require_legal(core)
+        weights = core.particles()[0].astype(np.float64)
+        if len(weights) != self.particles or not abs(weights.sum() - 1) < 1e-3:
+            raise ValueError("state is damaged: its weights have no sum of 1")
+        if not 0 <= core.effective_size <= 1.001 * self.particles:
+            raise ValueError(f"state is damaged: its effective size is {core.effective_size}")
 
     @property
     def particles(self) -> int:
