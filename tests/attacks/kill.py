@@ -298,7 +298,9 @@ def attack(name: str, times: int, seed: int, root: Path) -> Counter[str]:
 
 def call(*arguments: object) -> None:
     """Call the command line in this process."""
-    app([*map(str, arguments), "--quiet"], standalone_mode=False)
+    code = app([*map(str, arguments), "--quiet"], standalone_mode=False)
+    if code:
+        raise RuntimeError(f"exit code {code}")
 
 
 def finish(work: Callable[[], None], killed_after_s: float | None) -> float:

@@ -143,6 +143,17 @@ def test_what_was_stopped_is_removed_by_the_next_run(tmp_path: Path) -> None:
     assert files(tmp_path) == {"out/a.csv": "new"}
 
 
+@pytest.mark.parametrize("left", [(), (".auvest.json",), (".auvest.json.0123abcd.unfinished",)])
+def test_a_stop_at_the_very_beginning_is_in_nobodys_way(
+    tmp_path: Path, left: tuple[str, ...]
+) -> None:
+    (tmp_path / "out.unfinished").mkdir()
+    for name in left:
+        (tmp_path / "out.unfinished" / name).write_text("")
+    publish(tmp_path / "out")
+    assert files(tmp_path) == {"out/a.csv": "new"}
+
+
 def test_a_stop_between_the_two_names_is_mended(tmp_path: Path) -> None:
     publish(tmp_path / "out", text="old")
     (tmp_path / "out").rename(tmp_path / "out.old")  # and there it was stopped
