@@ -29,6 +29,7 @@ COMMANDS: Mapping[tuple[str, ...], str] = {
     ("import",): "Turn a published recording into logs for 'auvest replay'.",
     ("mission",): "Play the vehicle that the sketch mission steers, on a board or simulated.",
     ("replay",): "Replay recorded runs through a filter.",
+    ("version",): "Show the version, and what this build lacks.",
     ("simulate", "aukf"): (
         "Simulate the AUKF paper's scenario and show errors, intervals and consistency."
     ),
@@ -93,13 +94,17 @@ def _lazy(words: tuple[str, ...], line: str) -> type[TyperCommand]:
 
     class Lazy(TyperCommand):
         def make_context(self, *arguments: Any, **options: Any) -> Any:
+            from auvest.commands.console import discard_unpublished
+
             found = import_module(_module(words))
             real = typer.Typer(rich_markup_mode="rich", add_completion=False)
             about = (found.__doc__ or "").partition("\n\n")[2]
             about = about.replace("Examples\n--------\n", "Examples:\n\n")
             text = f"{line}\n\n{about}\n{EXIT_CODES}\n"
             real.command(self.name, help=text)(found.command)
-            return typer.main.get_command(real).make_context(*arguments, **options)
+            context = typer.main.get_command(real).make_context(*arguments, **options)
+            context.call_on_close(discard_unpublished)
+            return context
 
     return Lazy
 
@@ -119,9 +124,9 @@ _grow()
 
 def _show_version(wanted: bool) -> None:
     if wanted:
-        from auvest.commands.version import version
+        from auvest.commands.version import lines
 
-        typer.echo(f"auvest {version()}")
+        typer.echo("\n".join(lines()))
         raise typer.Exit
 
 

@@ -1078,7 +1078,7 @@ def test_ctrl_c_keeps_what_was_done(tmp_path: Path, million: Path) -> None:
         [sys.executable, "-m", "auvest", "replay", million, "--output", output, "--json"],
         env={**os.environ, "COLUMNS": "200"},
     )
-    track = output / "million" / "trajectory.tum"
+    track = output / "million.unfinished" / "trajectory.tum"
     wait_until(
         lambda: track.exists() and track.stat().st_size > 100_000, "nothing was written", program
     )

@@ -9,6 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
 
 _TURN = 2 * math.pi + 1e-6
 
@@ -32,6 +36,13 @@ class Column:
         """What a value must be, in words."""
         kind = "an integer" if self.integer else "a number"
         return f"{kind} from {self.low:.6g} to {self.high:.6g}"
+
+    def takes(self, values: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
+        """Say of each value whether it can stand in this column; NaN cannot."""
+        good = (values >= self.low) & (values <= self.high)
+        if self.integer:
+            good &= values == np.floor(values)
+        return np.asarray(good, bool)
 
 
 _COLUMNS = {

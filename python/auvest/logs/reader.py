@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from auvest._outputs import is_plain_file
 from auvest.logs.layout import FILES, Column
 
 Rows = npt.NDArray[np.float64]
@@ -86,6 +87,8 @@ class CsvTable:
     def __init__(self, path: Path) -> None:
         self.path = path
         try:
+            if path.exists() and not is_plain_file(path):  # a pipe would be waited for
+                raise LogError(path, "is not a file")
             self.bytes = path.stat().st_size
             with path.open(encoding="utf-8-sig", newline="\n") as file:
                 header = file.readline()
@@ -218,9 +221,7 @@ class CsvTable:
     def _check(self, rows: Rows, first: int) -> None:
         for k, column in enumerate(self.columns):
             values = rows[:, k]
-            good = (values >= column.low) & (values <= column.high)  # false for NaN
-            if column.integer:
-                good &= values == np.floor(values)
+            good = column.takes(values)
             if good.all():
                 continue
             i = int(np.argmin(good))

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from auvest._interrupts import HeldInterrupts
 from auvest.logs import LogFolder
 from auvest.logs.findings import Finding
 from auvest.logs.origin import local_origin, shifted
@@ -127,18 +128,20 @@ def replay(
     with ExitStack() as stack:
         files = _open(folder, stack)
         try:
+            held = stack.enter_context(HeldInterrupts())
             found += checks.files(log, settings)
             for batch in engine.batches():
                 if origin is not None:
                     batch = tables.moved(batch, origin)
-                residuals.add(batch)
-                tally.add(batch)
-                for write in files:
-                    write(batch)
-                estimates.add(batch.estimates)
-                errors.add(batch.errors)
-                measurements.add(batch.measurements)
-                outliers.add(_outliers(batch.measurements))
+                with held:  # so that all tables and figures are of the same rows
+                    residuals.add(batch)
+                    tally.add(batch)
+                    for write in files:
+                        write(batch)
+                    estimates.add(batch.estimates)
+                    errors.add(batch.errors)
+                    measurements.add(batch.measurements)
+                    outliers.add(_outliers(batch.measurements))
                 if progress is not None:
                     progress(engine.bytes_read, engine.bytes)
             found += checks.innovations(local, settings, name, residuals, found, causes=causes)
