@@ -64,6 +64,7 @@ template <class Scalar, int N, int K>
 struct GaussianSumState {
   GaussianMixture<Scalar, N, K> mixture;  ///< its components count where there are several
   std::uint8_t accepted = 0;              ///< ranges since it was not converged or ambiguous, to 6
+  std::uint8_t headings = 1;              ///< of which each is to have a ring of its own
   Scalar bend = Scalar(0);  ///< 3 sqrt(2) sigma z of the last range: a wider variance bends
 };
 
@@ -103,10 +104,39 @@ class GaussianSum : public Robust_ {
     return status;
   }
 
+  /// The same with a heading, the third state, that is not known at all: `headings` components, 2
+  /// and more, whose sigma is half of their distance. The heading of x0 and its part of P0 do not
+  /// count. The first range from a wide position makes a ring of each; K must be 8 times as many.
+  Status reset(const State& x0, const Covariance& P0, int headings) {
+    static_assert(kStates >= 3, "the third state is the heading");
+    if (params_check_ != Status::kOk) return params_check_;
+    if (headings < 2 || headings * 8 > params_.components) return Status::kBadParameter;
+    const Scalar apart = math::two_pi<Scalar>() / Scalar(headings);
+    BeliefType one;
+    math::copy(x0, one.x);
+    math::copy(P0, one.P);
+    for (int i = 0; i < kStates; ++i) one.P(2, i) = one.P(i, 2) = Scalar(0);
+    one.P(2, 2) = Scalar(0.25) * (apart * apart);
+    one.x(2) = Scalar(0);
+    const Status status = Base::reset(one.x, one.P);
+    if (status != Status::kOk) return status;
+    forget();
+    Mixture& mixture = state_.mixture;
+    for (int k = 0; k < headings; ++k) {
+      one.x(2) = Scalar(k) * apart;
+      mixture.weight[k] = Scalar(1) / Scalar(headings);
+      math::copy(one, mixture.component[k]);
+    }
+    mixture.size = state_.headings = static_cast<std::uint8_t>(headings);
+    mixture.moments(this->belief_in_place());
+    return Status::kOk;
+  }
+
   /// Takes back what belief(), rule() and state() gave: the same bits go on.
   Status restore(const BeliefType& saved, const Rule& rule, const SumState& state) {
     const bool several = state.mixture.size > 1;
-    if (state.mixture.size < 1 || state.accepted > kConfirmed ||
+    if (state.mixture.size < 1 || state.accepted > kConfirmed || state.headings < 1 ||
+        (state.headings > 1 && state.headings * 8 > params_.components) ||
         !math::is_nonnegative(state.bend) ||
         (several && !state.mixture.valid(params_.components))) {
       return Status::kBadParameter;
@@ -215,6 +245,7 @@ class GaussianSum : public Robust_ {
   void forget() {
     state_.mixture.size = 1;
     state_.accepted = 0;
+    state_.headings = 1;
     state_.bend = Scalar(0);
   }
 
@@ -306,6 +337,7 @@ class GaussianSum : public Robust_ {
     const Status status = update_all(z, model, correction);
     if (status != Status::kOk) return status;
     if (size() > 1) tidy();
+    state_.headings = 1;
     count(correction, bend);
     return status;
   }
@@ -341,9 +373,12 @@ class GaussianSum : public Robust_ {
     const BeliefType& whole = this->belief();
     const Scalar dx = whole.x(0) - circle.centre[0];
     const Scalar dy = whole.x(1) - circle.centre[1];
-    if (!state_.mixture.ring(whole, circle, params_.components)) {
-      return Status::kNotPositiveDefinite;
-    }
+    const int parts = size() == state_.headings ? size() : 1;
+    const int each = params_.components / parts;
+    const bool done =
+        parts > 1 ? state_.mixture.rings(circle, each) : state_.mixture.ring(whole, circle, each);
+    if (!done) return Status::kNotPositiveDefinite;
+    state_.headings = 1;
     // What a plain update would report, before the circle was seen to bend.
     using math::sqrt;
     const Scalar range = sqrt(dx * dx + dy * dy);
