@@ -155,7 +155,8 @@ struct GaussianMixture {
   /// own mean covariance is below `limit`. Every further state counts for itself.
   AUVEST_OUTLINE void merge(Scalar limit) {
     Nearest nearest[K];  // of each, among those behind it
-    for (int i = 0; i < size; ++i) nearest[i] = nearest_of(i, limit);
+    for (int i = 0; i < size; ++i) nearest[i].reach = reach_of(i, limit);
+    for (int i = 0; i < size; ++i) find_nearest(nearest, i, limit);
     while (size > 1) {
       int first = 0;
       for (int i = 1; i < size; ++i) {
@@ -166,14 +167,15 @@ struct GaussianMixture {
       join(first, second);
       // Only what was near to one of the two is looked for anew.
       for (int i = second; i < size; ++i) nearest[i] = nearest[i + 1];
+      nearest[first].reach = reach_of(first, limit);
       for (int i = 0; i < size; ++i) {
         Nearest& known = nearest[i];
         const int index = known.index;
         if (index > second) --known.index;
         if (i == first || index == first || index == second) {
-          known = nearest_of(i, limit);
+          find_nearest(nearest, i, limit);
         } else if (i < first) {
-          const Scalar apart = distance2(i, first, limit);
+          const Scalar apart = distance2(i, first, known.reach + nearest[first].reach, limit);
           if (apart < known.distance2 || (apart == known.distance2 && first < known.index)) {
             known.distance2 = apart;
             known.index = static_cast<std::uint8_t>(first);
@@ -307,35 +309,40 @@ struct GaussianMixture {
 
   struct Nearest {
     Scalar distance2;    ///< `limit` where none is nearer
-    std::uint8_t index;  ///< its own then
+    Scalar reach;        ///< of the component itself: see distance2()
+    std::uint8_t index;  ///< its own where none is nearer
   };
 
+  Scalar reach_of(int i, Scalar limit) const {
+    return Scalar(0.5) * limit * (component[i].P(0, 0) + component[i].P(1, 1));
+  }
+
   /// The lower index where two are as near.
-  AUVEST_OUTLINE Nearest nearest_of(int i, Scalar limit) const {
-    Nearest nearest = {limit, static_cast<std::uint8_t>(i)};
+  AUVEST_OUTLINE void find_nearest(Nearest* nearest, int i, Scalar limit) const {
+    Nearest& own = nearest[i];
+    own.distance2 = limit;
+    own.index = static_cast<std::uint8_t>(i);
     for (int j = i + 1; j < size; ++j) {
-      const Scalar apart = distance2(i, j, limit);
-      if (apart < nearest.distance2) {
-        nearest.distance2 = apart;
-        nearest.index = static_cast<std::uint8_t>(j);
+      const Scalar apart = distance2(i, j, own.reach + nearest[j].reach, limit);
+      if (apart < own.distance2) {
+        own.distance2 = apart;
+        own.index = static_cast<std::uint8_t>(j);
       }
     }
-    return nearest;
   }
 
   /// d' ((P_i + P_j) / 2)^-1 d of the position, and d^2 over the mean variance of every further
-  /// state; `limit` where it is no less than that.
-  AUVEST_OUTLINE Scalar distance2(int i, int j, Scalar limit) const {
+  /// state; `limit` where it is no less than that. `reach`: the sum of both. No direction is wider
+  /// than the trace says, so that most pairs are done with at once.
+  AUVEST_OUTLINE Scalar distance2(int i, int j, Scalar reach, Scalar limit) const {
     const Belief<Scalar, N>& one = component[i];
     const Belief<Scalar, N>& other = component[j];
-    // No direction is wider than the trace says: most pairs are done with here.
-    const Scalar s_xx = one.P(0, 0) + other.P(0, 0);
-    const Scalar s_yy = one.P(1, 1) + other.P(1, 1);
-    const Scalar reach = Scalar(0.5) * limit * (s_xx + s_yy);
     const Scalar dx = one.x(0) - other.x(0);
     if (dx * dx > reach) return limit;
     const Scalar dy = one.x(1) - other.x(1);
     if (dy * dy > reach) return limit;
+    const Scalar s_xx = one.P(0, 0) + other.P(0, 0);
+    const Scalar s_yy = one.P(1, 1) + other.P(1, 1);
     const Scalar s_yx = one.P(1, 0) + other.P(1, 0);
     const Scalar q = s_yx / s_xx;
     const Scalar rest = math::larger(s_yy - q * s_yx, math::pivot_floor(s_yy));

@@ -428,9 +428,10 @@ class GaussianSum : public Robust_ {
     if (!(belief.P(0, 0) + belief.P(1, 1) > noise)) return Scalar(0);
     const Scalar dx = belief.x(0) - circle.centre[0];
     const Scalar dy = belief.x(1) - circle.centre[1];
-    const Scalar range = sqrt(dx * dx + dy * dy);
-    const Scalar v = range > Scalar(0) ? variance_along(belief.P, -dy / range, dx / range)
-                                       : LongAxis<Scalar>(belief.P).variance;
+    const Scalar square = dx * dx + dy * dy;
+    const Scalar range = sqrt(square);
+    const Scalar v = square > Scalar(0) ? variance_along(belief.P, -dy, dx) / square
+                                        : LongAxis<Scalar>(belief.P).variance;
     // At least sigma: nearer than that v > 9 R is the stronger condition.
     const Scalar near = math::larger(circle.sigma, range < circle.radius ? range : circle.radius);
     const Scalar ratio = v / near;
