@@ -3,7 +3,8 @@
 // A process model is a plain struct. It derives from ProcessModel<Itself, Scalar, N> and offers
 //
 //     Vector<Scalar, N>    f(x, dt)    the state after dt seconds without noise
-//     Matrix<Scalar, N, N> Q(dt)       covariance of the process noise of those dt seconds
+//     Matrix<Scalar, N, N> Q(dt)       covariance of the process noise of those dt seconds; or
+//                                      add_noise(P, dt), which adds it to a lower triangle
 //     Matrix<Scalar, N, N> Phi(x, dt)  Jacobian of f with respect to x (EKF only)
 //     Status               check()     kOk, or kBadParameter if a parameter is out of range
 //
@@ -58,6 +59,15 @@ struct ProcessModel {
       }
     }
   };
+
+  /// From the model's add_noise(P, dt), for a model that has no Q of its own.
+  Covariance Q(Scalar dt) const {
+    Covariance q;
+    math::set_zero(q);
+    derived().add_noise(q, dt);
+    math::mirror_lower(q);
+    return q;
+  }
 
   NumericExpansion about(const State& x, Scalar dt) const {
     return NumericExpansion{derived(), x, dt, derived().f(x, dt)};
