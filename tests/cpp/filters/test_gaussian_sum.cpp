@@ -326,7 +326,8 @@ void check_shares(const Filter& filter, const auvest::StartCase& which, double l
   }
 }
 
-TEST_CASE("unknown start: as many runs are right as in the prototype, and few are wrong") {
+TEST_CASE("unknown start: as many runs are right as in the prototype, and few are wrong" *
+          doctest::test_suite("statistics")) {
   const auto single = auvest::start_filter<float, auvest::Ekf, Igg, 16>();
   const auto points = auvest::start_filter<double, auvest::Ukf, Igg, 32>();
   for (const auto& row : auvest::kStartFigures) {
@@ -339,7 +340,8 @@ TEST_CASE("unknown start: as many runs are right as in the prototype, and few ar
   }
 }
 
-TEST_CASE("a start known to 100 m: components are split where circles bend") {
+TEST_CASE("a start known to 100 m: components are split where circles bend" *
+          doctest::test_suite("statistics")) {
   const auto filter = auvest::start_filter<float, auvest::Ekf, Igg, 16>();
   const auto& row = auvest::kStartPriorFigures[2];
   StartScenario scenario;
@@ -357,7 +359,8 @@ TEST_CASE("a start known to 100 m: components are split where circles bend") {
   }
 }
 
-TEST_CASE("unknown start: a million metres are as good as a hundred thousand") {
+TEST_CASE("unknown start: a million metres are as good as a hundred thousand" *
+          doctest::test_suite("statistics")) {
   const auto filter = auvest::start_filter<float, auvest::Ekf, Igg, 16>();
   StartScenario scenario;
   scenario.drawn_from_prior = true;
@@ -882,7 +885,8 @@ TEST_CASE_TEMPLATE("nothing is NaN or indefinite where geometry has no answer", 
   check();
 }
 
-TEST_CASE("single precision: any sequence of ranges leaves a positive definite belief") {
+TEST_CASE("single precision: any sequence of ranges leaves a positive definite belief" *
+          doctest::test_suite("statistics")) {
   auto filter = auvest::start_filter<float, auvest::Ekf, Igg, 16>();
   Random random(11, 1);
   int bad = 0;
@@ -1020,7 +1024,8 @@ int right_of(int runs, int components, int headings) {
   return right;
 }
 
-TEST_CASE("unknown start: with a heading known to half a radian, and with one not known at all") {
+TEST_CASE("unknown start: with a heading known to half a radian, and with one not known at all" *
+          doctest::test_suite("statistics")) {
   // The prototype: 99 and 95 % of 400 runs.
   const int runs = 100;
   CHECK(right_of(runs, 16, 1) >= runs * auvest::start_bound(0.99, 400, runs));
