@@ -547,6 +547,8 @@ def page(rows: list[Row]) -> str:
         "bearing occur. `robust_ekf_predict` and `robust_ekf_update`: dead reckoning by speed and",
         "heading and one range, M-estimation EKF of two states with IGG and the recovery, a range",
         "of ten an outlier, and a lock-out half-way; the same program, its two halves.",
+        "`unknown_start_predict` and `unknown_start_update`: the same from a sigma of 100 km, with",
+        "16 components (a ring at the start and after the lock-out); the medians are with one.",
         f"`slatf1` and `slatf2`: N = {AVR_PARTICLES}, one master, two predictions and one echo,",
         f"{ECHOES} times at the beginning of the paper's scenario; `slatf_joint`: the same with",
         f"N = {JOINT_PARTICLES}; `ekf_slat` and, with the three models of an `Imm` for the master,",
