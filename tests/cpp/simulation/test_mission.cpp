@@ -134,7 +134,8 @@ Spread fly_runs(const MissionScenario& scenario, int runs) {
   return spread;
 }
 
-TEST_CASE("mission with noise: each estimate within its statistics, over some runs") {
+TEST_CASE("mission with noise: each estimate within its statistics, over some runs" *
+          doctest::test_suite("statistics")) {
   // Mean and standard error of 50 runs of an independent prototype; here of 12 with other seeds.
   struct Case {
     MissionSource source;
@@ -187,7 +188,8 @@ double share_within(const std::vector<double>& sums, double low, double high) {
   return inside / static_cast<double>(sums.size());
 }
 
-TEST_CASE("mission: the model-aided filter knows how far off it is, where its model holds") {
+TEST_CASE("mission: the model-aided filter knows how far off it is, where its model holds" *
+          doctest::test_suite("statistics")) {
   // A compass without bias, a current that walks as the filter thinks, and the noise of the log in
   // q: 0.05 m/s at 10 Hz are 2.5e-4 m^2/s, the heading's noise adds 2e-5.
   MissionScenario s = mission_source(MissionSource::kModelAidedCrab, MissionTrack::kCircle);

@@ -15,6 +15,7 @@
 //     kClosedForm            true if it does
 //     propagate(belief, dt)  x <- f, P <- Phi P Phi' + Q in place, from the structure of Phi
 //     kLinear                true if f is linear in x: the UKF then calls propagate, which is exact
+//     kTranslation           true if f moves every state by the same, and Q does not depend on x
 //     Input, input           type and value of what drives the process (a Vector), for
 //                            predict(dt, input)
 //     position_variance(belief, dt)
@@ -36,6 +37,7 @@ struct ProcessModel {
   static constexpr int kStates = N;
   static constexpr bool kLinear = false;
   static constexpr bool kClosedForm = false;
+  static constexpr bool kTranslation = false;
 
   /// f about x, with deviations by subtraction: f(x + e) - f(x) loses the digits that f(x) and
   /// f(x + e) share, so filters limit how small alpha may be (see SigmaPoints).
