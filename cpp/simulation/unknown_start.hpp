@@ -25,6 +25,7 @@ namespace auvest {
 /// What the runs have in common.
 struct StartScenario {
   int leaders = 3;                ///< 1..4
+  double moving_fraction = 0.5;   ///< of the runs: the leaders move, at up to 2 m/s
   bool spread = true;             ///< round the craft (two: 60 to 120 deg apart), or all in 30 deg
   double late_fraction = 0;       ///< of the ranges: late by 5 to 50 m
   double outlier_fraction = 0;    ///< of the ranges: with ten times the sigma
@@ -47,7 +48,7 @@ class StartWorld {
       : scenario_(scenario), random_(seed, run) {
     const double turn = math::two_pi<double>();
     const double distance = 50 * math::exp(uniform(0, 1) * math::log(20.0));  // 50..1000 m
-    const bool moving = uniform(0, 1) < 0.5;
+    const bool moving = uniform(0, 1) < scenario.moving_fraction;
     const double first = uniform(0, turn);
     const double apart = uniform(turn / 6, turn / 3);
     for (int k = 0; k < scenario.leaders; ++k) {
