@@ -38,6 +38,7 @@ from auvest import montecarlo, telemetry
 from auvest._outputs import MANIFEST, OLD, UNFINISHED
 from auvest.cli import app
 from auvest.commands import reproduce
+from auvest.commands.console import discard_unpublished
 
 #: Both inputs of every command.
 VARIANTS = ("a", "b")
@@ -147,7 +148,10 @@ class Reproduce(Attack):
         option = Annotated[int, typer.Option("--runs")]
         made.command()(reproduce.command(measure, page, lambda _: [], figures=False, runs=option))
         runs = str(1 + VARIANTS.index(variant))
-        call("--runs", runs, "--output", root / "out", of=made)
+        try:
+            call("--runs", runs, "--output", root / "out", of=made)
+        finally:
+            discard_unpublished()  # as auvest.cli does
 
 
 class Capture(Attack):
