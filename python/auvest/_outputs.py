@@ -140,7 +140,7 @@ class NewFolder:
         """Remove what was written, unless it is published; safe to call at any time."""
         if self._lock >= 0:
             with contextlib.suppress(OSError):
-                shutil.rmtree(self.part)
+                _remove(self.part)
                 for folder in self._made:
                     folder.rmdir()  # unless somebody has put something there
             self._unlock()
@@ -191,9 +191,10 @@ class NewFolder:
         """Remove what was stopped before it was finished, if it is ours and nobody writes it."""
         shown = self.path.with_name(self.part.name)
         there = _names(self.part) if _is_folder(self.part) else {""}
-        if not (there <= {MANIFEST} or "command" in _manifest(self.part)):
+        unsigned = all(name.startswith(MANIFEST) for name in there)  # stopped at the very beginning
+        if not (unsigned or "command" in _manifest(self.part)):
             raise OutputError(f"{shown} is there, and auvest has not made it: move it away")
-        if precious and there - {MANIFEST}:
+        if precious and not unsigned:
             raise OutputError(
                 f"{shown} holds what was recorded when auvest was stopped: move it away, or "
                 "remove it with --force"
@@ -202,7 +203,7 @@ class NewFolder:
         try:
             if lock < 0:
                 raise OutputError(f"{shown} is being written by another auvest")
-            shutil.rmtree(self.part)
+            _remove(self.part)
         finally:
             if lock >= 0:
                 os.close(lock)

@@ -27,6 +27,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "auvest/models/piecewise_acceleration.hpp"
@@ -222,6 +223,18 @@ std::vector<Scalar> changed(const desk::Parameters& parameters, Bytes& bytes) {
   return values;
 }
 
+/// A model with some parameters changed; null where they are refused.
+template <class Entry>
+auto made(const Entry& entry, Bytes& bytes) {
+  const std::vector<Scalar> values = changed(entry.parameters, bytes);
+  if constexpr (std::is_invocable<decltype(entry.make), const Scalar*, Status&>::value) {
+    Status why;
+    return entry.make(values.data(), why);
+  } else {
+    return entry.make(values.data());
+  }
+}
+
 AnyKernel<Scalar> kernel(Bytes& bytes) {
   AnyKernel<Scalar> made;
   made.kind = typename AnyKernel<Scalar>::Kind(bytes.below(4));
@@ -261,12 +274,12 @@ class Gaussian {
   explicit Gaussian(Bytes& bytes) : bytes_(bytes) {
     auto entry = catalogue().processes.begin();
     std::advance(entry, bytes.below(int(catalogue().processes.size())));
-    process_ = entry->second.make(changed(entry->second.parameters, bytes).data());
+    process_ = made(entry->second, bytes);
     if (process_ == nullptr) return;
     for (const auto& sensor : catalogue().sensors) {
       if (sensor.first.second != process_->states) continue;
-      auto made = sensor.second.make(changed(sensor.second.parameters, bytes).data());
-      if (made != nullptr) sensors_.push_back(std::move(made));
+      auto model = made(sensor.second, bytes);
+      if (model != nullptr) sensors_.push_back(std::move(model));
     }
     using Options = desk::FilterOptions<Scalar>;
     options_.kind = typename Options::Linearisation::Kind(bytes.below(3));
@@ -311,7 +324,10 @@ class Gaussian {
     if (what == 7) {
       twin_ = make();
       say("restore");
-      if (twin_->restore(before) != Status::kOk) broken("a saved state is refused", name_);
+      if (twin_->restore(before) != Status::kOk) {
+        no_belief("a saved state is refused", before.P, name_);
+        twin_.reset();
+      }
       return;
     }
     if (what <= 2) {

@@ -456,7 +456,8 @@ class Steps:
         if master is None:
             if masters > 1 and not self._unknown:
                 raise TypeError(f"master must be given: the filter has {masters} masters")
-            return np.full(count, UNKNOWN_MASTER if self._unknown else 0, np.int64)
+            nobody = self._unknown or masters == 0  # then the core has the word
+            return np.full(count, UNKNOWN_MASTER if nobody else 0, np.int64)
         raw = np.asarray(master)
         if raw.dtype.kind not in "iu":
             raise TypeError(f"master must be an int or an array of int, not of {raw.dtype.name}")
