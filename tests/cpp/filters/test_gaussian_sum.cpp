@@ -558,7 +558,7 @@ TEST_CASE("mixture: the closest two merge first, until none are close") {
     auvest::GaussianMixture<double, 2, 16> mixture;
     mixture.size = 12;
     for (int k = 0; k < mixture.size; ++k) {
-      mixture.component[k].x << 3 * random.normal<double>(), 3 * random.normal<double>();
+      mixture.component[k].x << random.normal<double>(), random.normal<double>();
       const double a = 0.2 + random.uniform<double>();
       mixture.component[k].P << a, 0.1, 0.1, 0.5;
       mixture.weight[k] = 1 / 12.0;
@@ -706,13 +706,17 @@ TEST_CASE_TEMPLATE("a refused call changes nothing, a restored filter goes on wi
   CHECK(several >= 2);
 }
 
-TEST_CASE("single precision: a leader whose distance has no square is refused") {
+TEST_CASE("single precision: what has no square is refused") {
   auto filter = auvest::start_filter<float, auvest::Ekf, Igg, 16>();
-  begin(filter, 0, 0, 1e18);
-  const auto before = filter;
-  const auto far = leader<float>(3e19, 0);
-  CHECK(filter.update(Vector<float, 1>(1e18f), far).status == Status::kOverflow);
-  CHECK(same_state(filter, before));
+  const auto refused = [&filter](double sigma, float range, double leader_x) {
+    begin(filter, 0, 0, sigma);
+    const auto before = filter;
+    const auto sensor = leader<float>(leader_x, 0);
+    CHECK(filter.update(Vector<float, 1>(range), sensor).status == Status::kOverflow);
+    CHECK(same_state(filter, before));
+  };
+  refused(1e18, 1e18f, 3e19);
+  refused(1.5e19, 1.9e19f, 0);  // wide beside the range, but a ring of it has no covariance
 }
 
 TEST_CASE("what no filter left is not restored") {
@@ -870,6 +874,8 @@ TEST_CASE_TEMPLATE("nothing is NaN or indefinite where geometry has no answer", 
           filter.update(Vector<Scalar, 1>(static_cast<Scalar>(z)), leader<Scalar>(0, 0)).status;
       CHECK(status == Status::kOk);
       check();
+      // As from a range of one sigma: the ring's radius, its width and that of its components.
+      if (k == 0) CHECK(sigma_m(filter) == doctest::Approx(std::sqrt(2)).epsilon(0.05));
     }
     CHECK(error_m(filter, 0, 0) < 1);
     CHECK(sigma_m(filter) > 0.5);
@@ -1050,6 +1056,7 @@ TEST_CASE("a heading that is not known: components all round, and a ring of each
   REQUIRE(filter.update(Vector<double, 1>(100), sensor).status == Status::kOk);
   CHECK(filter.size() == 32);
   CHECK(weight_sum(filter) == doctest::Approx(1));
+  CHECK(filter.state().bend == close_to(300 * std::sqrt(2.0), 1e-7));
   int of_heading[4] = {0, 0, 0, 0};
   for (int k = 0; k < 32; ++k) {
     const auto& one = filter.component(k);
