@@ -111,6 +111,7 @@ class RobustReplay {
     Sensor sensor;
     sensor.params.sigma_range_m = read();
     sensor.params.sigma_leader_m = read();
+    sensor.params.lift_smallest();  // the noise of a record is not cut off at 0
     Filter filter{Plain(Process(params)), rule_};
     typename Filter::State x0;
     typename Filter::Covariance p0;

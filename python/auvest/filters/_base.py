@@ -28,6 +28,7 @@ from auvest._arguments import (
     as_real,
     as_step,
     as_steps,
+    far_from_origin,
     require_range,
 )
 from auvest._core import Decision, Status
@@ -51,6 +52,8 @@ Sensors: TypeAlias = MeasurementModel | Sequence[MeasurementModel] | Mapping[str
 _UPDATE = _core.robust_update_defaults()
 _FIXED = FixedInterval()
 _UNIT = Unit()
+_POSITION = ("x_m", "y_m", "z_m")
+_STEP_SIGMA_M = 0.1
 _REPORT = ("innovation", "S", "standardised", "weight")
 
 
@@ -77,6 +80,7 @@ class GaussianFilter:
         recovery: RejectionStreak | None = None,
         policy: IntervalPolicy | None = None,
         late_s: float = 0.0,
+        longest_step_s: float = 3600.0,
         residual: Residual = "innovation",
         max_iterations: int = _UPDATE["max_iterations"],
         tolerance: float = _UPDATE["tolerance"],
@@ -103,6 +107,9 @@ class GaussianFilter:
         self._policy = policy
         self._options: dict[str, Any] = {
             "late_s": as_number("late_s", late_s, "not negative"),
+            "longest_step_s": as_number(
+                "longest_step_s", longest_step_s, "positive", infinite=True
+            ),
             "residual": as_kind("residual", residual, ("innovation", "post-fit")),
             "max_iterations": as_integer("max_iterations", max_iterations, 2, 255),
             "tolerance": as_number("tolerance", tolerance, "not negative"),
@@ -114,10 +121,13 @@ class GaussianFilter:
         start = state[[0, min(1, states - 1)]]
         if reference is not None:
             start = as_array("reference", reference, (2,), self._dtype)
+        self._require_local(state, covariance)
         self._build()
         try:
             self._filter.reset(state, covariance, start)
         except _core.StatusError as error:
+            if error.status == Status.far_from_origin:
+                raise ValueError(far_from_origin("x0", state[:2], self._dtype)) from None
             if error.status != Status.not_positive_definite:
                 raise ValueError(f"x0 and P0 are refused: {error}") from None
             smallest = np.linalg.eigvalsh(covariance.astype(np.float64))[0]
@@ -125,6 +135,17 @@ class GaussianFilter:
                 f"P0 must be positive definite in {self._dtype.name}, "
                 f"but its smallest eigenvalue is {smallest:.3g}"
             ) from None
+
+    def _require_local(self, state: Floats, covariance: Floats) -> None:
+        """Refuse a start where what a craft moves between two steps is rounded away.
+
+        However little is known of where it is, steps are of the size of _STEP_SIGMA_M or less.
+        """
+        is_coarse = getattr(_core, f"is_coarse_{self._dtype.name}")
+        position = [i for i, name in enumerate(self._process.state) if name in _POSITION]
+        sigmas = np.minimum(np.diagonal(covariance), _STEP_SIGMA_M**2)
+        if any(is_coarse(float(state[i]), float(sigmas[i])) for i in position):
+            raise ValueError(far_from_origin("x0", state[position], self._dtype))
 
     def _build(self) -> None:
         self._filter = self._core_filter(self._policy)
@@ -138,6 +159,8 @@ class GaussianFilter:
         """Make a filter of the core like this one, with the policy given."""
         name = self._dtype.name
         numbers = {**self._parameters, "late_s": self._options["late_s"]}
+        if self.longest_step_s < np.inf:
+            numbers["longest_step_s"] = self.longest_step_s
         require_range(numbers, name)
         options = {
             "linearisation": self._linearisation,
@@ -147,6 +170,7 @@ class GaussianFilter:
             "max_iterations": self._options["max_iterations"],
             "tolerance": self._options["tolerance"],
             "late_s": self._options["late_s"],
+            "longest_step_s": self._options["longest_step_s"],
         }
         try:
             return getattr(_core, f"Filter_{name}")(
@@ -204,7 +228,11 @@ class GaussianFilter:
 
     @property
     def status(self) -> Status:
-        """What the core reported last: ``Status.ok`` unless a FilterError was raised."""
+        """What the core reported last: ``Status.ok`` unless a FilterError was raised.
+
+        ``Status.recoveries_repeat`` while the recovery has widened the covariance so often that it
+        does not any more: then a model is wrong, and not the estimate.
+        """
         return self._filter.status
 
     @property
@@ -241,6 +269,11 @@ class GaussianFilter:
     def late_s(self) -> float:
         """How long ago a measurement may have been taken, s."""
         return float(self._options["late_s"])
+
+    @property
+    def longest_step_s(self) -> float:
+        """A longer prediction is refused, s; infinity: none is."""
+        return float(self._options["longest_step_s"])
 
     @property
     def policy(self) -> IntervalPolicy | None:
@@ -294,7 +327,7 @@ class GaussianFilter:
         Parameters
         ----------
         dt : float, optional
-            Seconds; default: the ``interval`` that the policy chose.
+            Seconds, at most ``longest_step_s``; default: the ``interval`` that the policy chose.
         input : array_like, shape (k,)
             What drove the process in that time, named by ``process.input``; not given for a process
             without input.
@@ -314,7 +347,7 @@ class GaussianFilter:
         if code == _core.UNCLEAR:
             step = None if dt is None else as_step(dt, self._dtype)
             code = self._filter.predict(step, self._as_input(input))
-        self._require_done(f"predict(dt={dt})", code)
+        self._require_done(f"predict(dt={dt})", code, dt=dt)
 
     def update(
         self,
@@ -366,7 +399,7 @@ class GaussianFilter:
                 hint=f"age_s = {age_s} is more than late_s = {self.late_s} or than the filter "
                 "has run",
             )
-        self._require_done("update", code)
+        self._require_done("update", code, z=z, sensor=sensor, place=place)
 
     def feedback(self, reference: npt.ArrayLike | None = None) -> float:
         """Choose the interval to the next sample, after the update; only with a policy.
@@ -415,7 +448,8 @@ class GaussianFilter:
             A measurement per row, those of smaller sensors filled up with NaN. NaN throughout: the
             measurement is missing and that row only predicts.
         dt : float or array_like, shape (T,)
-            Time from the row before (or the filter's present) to each row, s, not negative. With a
+            Time from the row before (or the filter's present) to each row, s, not negative and at
+            most ``longest_step_s``: a longer one ends the run with a FilterError at its row. With a
             policy the default is the intervals that it chooses; the record must then have been
             sampled at them.
         input : array_like, shape (T, k)
@@ -443,8 +477,10 @@ class GaussianFilter:
         ValueError, TypeError
             If an argument is wrong; the filter is unchanged.
         FilterError
-            If a row cannot be done. ``step`` names it, ``partial`` holds the results before it, and
-            the filter stays at the row before.
+            If a row cannot be done: ``dt`` beyond ``longest_step_s``, a range that the sensor
+            cannot measure, a place far from the origin, numbers that overflow. ``step`` names it,
+            ``partial`` holds the results before it, and the filter stays at the row before; a
+            further ``run`` may go on behind the row.
         """
         as_flag("covariance", covariance)
         handles, which = self._as_sensor_rows(sensor)
@@ -488,7 +524,15 @@ class GaussianFilter:
         }
         result = RunResult(**kept)
         if status != Status.ok:
-            error = FilterError("run", status, step=done, partial=result)
+            model = sensor if which is None else np.asarray(sensor)[done].item()
+            hint = self._why(
+                status,
+                dt=None if dt is None else record["dt"][done],
+                z=rows[done],
+                sensor=model,
+                place=None if record["place"] is None else record["place"][done],
+            )
+            error = FilterError("run", status, step=done, partial=result, hint=hint)
             try:
                 require_none_raised()
             except Exception as cause:
@@ -743,11 +787,50 @@ class GaussianFilter:
             self._filter = before
             raise
 
-    def _require_done(self, action: str, code: int) -> None:
+    def _require_done(self, action: str, code: int, **given: Any) -> None:
         if code == 0:
             return
         require_none_raised()
-        raise FilterError(action, Status(code)) from None
+        raise FilterError(action, Status(code), hint=self._why(Status(code), **given)) from None
+
+    def _why(
+        self,
+        status: Status,
+        *,
+        dt: Any = None,
+        z: Any = None,
+        sensor: str | MeasurementModel | None = None,
+        place: Any = None,
+    ) -> str:
+        """Explain a status that says less than is known here; empty for the others."""
+        if status == Status.step_too_long:
+            step = "the interval of the policy" if dt is None else f"dt = {float(dt):.6g} s"
+            return (
+                f"{step} is longer than longest_step_s = {self.longest_step_s:g} s: did the clock "
+                "jump, or is it in another unit?"
+            )
+        if status == Status.impossible_range:
+            name, model = self._named_sensor(sensor)
+            limits = ""
+            if hasattr(model, "smallest_range_m"):
+                limits = (
+                    f"; its ranges are {model.smallest_range_m:g} to {model.largest_range_m:g} m"
+                )
+            first = float(np.ravel(np.asarray(z))[0])
+            return (
+                f"{name} cannot measure a range of {first:g} m{limits}; NaN is for no measurement"
+            )
+        if status == Status.far_from_origin:
+            if place is None:
+                return far_from_origin("x", self.x[:2], self._dtype)
+            return far_from_origin("place", np.asarray(place), self._dtype)
+        return ""
+
+    def _named_sensor(self, sensor: str | MeasurementModel | None) -> tuple[str, MeasurementModel]:
+        if isinstance(sensor, MeasurementModel):
+            return type(sensor).__name__, sensor
+        name = next(iter(self._sensors)) if sensor is None else sensor
+        return name, self._sensors[name]
 
 
 def _as_sensors(sensors: Sensors, process: ProcessModel) -> dict[str, MeasurementModel]:
