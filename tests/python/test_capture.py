@@ -301,7 +301,7 @@ def test_port_is_recorded_to_the_bit(port: PortWithBoard, tmp_path: Path) -> Non
         assert np.float32(row["x_m"]) == np.float32(k / 3)
     assert table[2]["range_m"] == table[2]["nis"] == ""
     assert sorted(path.name for path in output.iterdir()) == [
-        "figure.png", "record.csv", "results.json",
+        ".auvest.json", "figure.png", "record.csv", "results.json",
     ]  # fmt: skip
 
 
@@ -331,7 +331,8 @@ def test_an_unplugged_board_keeps_its_samples(port: PortWithBoard, tmp_path: Pat
         board.say(HEADER)
         for k in range(1, 4):
             board.say(sample_line(k))
-        wait_until(lambda: lines_of(tmp_path / "record.csv") == 4, "the samples are recorded")
+        record = tmp_path.with_name(f"{tmp_path.name}.unfinished") / "record.csv"
+        wait_until(lambda: lines_of(record) == 4, "the samples are recorded")
         board.unplug()
 
     port.speak(script)
@@ -398,7 +399,7 @@ def test_interrupt_keeps_all_that_has_come(
         for k in range(1, 4):
             port.say(sample_line(k))
         # Each sample is on the disk before the command has ended.
-        record = tmp_path / "record.csv"
+        record = tmp_path.with_name(f"{tmp_path.name}.unfinished") / "record.csv"
         wait_until(lambda: lines_of(record) == 4, "the samples are recorded", process)
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=PATIENCE_S)

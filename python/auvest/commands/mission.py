@@ -85,6 +85,7 @@ def command(
     seed: options.Seed = 1,
     workers: options.Workers = None,
     output: options.Output = Path("auvest-output/mission"),
+    force: options.Force = False,
     no_figure: options.NoFigure = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
@@ -109,7 +110,7 @@ def command(
         )
     source = str(simulator or port)
     settings = {"source": source, "duration_s": duration, **mission.settings(plan)}
-    session = Session(terminal, output, "mission", settings)
+    session = Session(terminal, output, "mission", settings, force=force)
     samples = None if duration is None else max(1, round(duration / PERIOD_S))
     flights = [ChipFlight(Vehicle(plan, run)) for run in range(runs)]
     expected = samples or round(mission.simulate(plan, record=False).duration_s.mean() / PERIOD_S)

@@ -84,7 +84,13 @@ Workers = Annotated[
 Json = Annotated[bool, option(_OUTPUT, "One JSON object on stdout, nothing else.", "--json")]
 Quiet = Annotated[bool, option(_OUTPUT, "Only errors on stderr.", "--quiet", "-q")]
 Output = Annotated[
-    Path, option(_OUTPUT, "Folder for the results; made if missing.", "--output", file_okay=False)
+    Path,
+    option(
+        _OUTPUT,
+        "Folder for the results, which replace those of the same command before.",
+        "--output",
+        file_okay=False,
+    ),
 ]
 #: Recordings are not part of the package.
 Data = Annotated[
@@ -95,6 +101,14 @@ Data = Annotated[
         file_okay=False,
         help="Folder of the recordings.",
         show_default=False,
+    ),
+]
+Force = Annotated[
+    bool,
+    option(
+        _OUTPUT,
+        "Replace the results of another command in --output; set aside what is not auvest's.",
+        "--force",
     ),
 ]
 NoFigure = Annotated[bool, option(_OUTPUT, "Draw nothing.", "--no-figure")]

@@ -96,6 +96,7 @@ def command(
     seed: options.Seed = 1,
     workers: options.Workers = None,
     output: options.Output = Path("auvest-output/simulate-mission"),
+    force: options.Force = False,
     no_figure: options.NoFigure = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
@@ -131,7 +132,7 @@ def command(
             runs=runs,
             seed=seed,
         )
-    session = Session(terminal, output, "simulate mission", mission.settings(plan))
+    session = Session(terminal, output, "simulate mission", mission.settings(plan), force=force)
     result = session.run(mission.simulate, plan, workers=workers)
     values = measures(result)
     session.write_csv("per_step", means_per_step(result))

@@ -7,7 +7,8 @@ understand comes back here, to be converted or refused in words.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, NoReturn, TypeAlias
 
 import numpy as np
@@ -17,6 +18,7 @@ from auvest import _core
 from auvest._arguments import (
     DType,
     Floats,
+    InUse,
     as_array,
     as_covariance,
     as_dtype,
@@ -32,14 +34,15 @@ from auvest._arguments import (
     require_range,
 )
 from auvest._core import Decision, Status
-from auvest._state import describe, pack, unpack
-from auvest.errors import FilterError
+from auvest._interrupts import first_slice, in_slices
+from auvest._state import describe, pack, require, unpack
+from auvest.errors import FilterError, Interrupted
 from auvest.filters.results import Report, RunResult
 from auvest.intervals import FixedInterval, IntervalPolicy, MahalanobisInterval, core_interval
 from auvest.kernels import Kernel, KernelName, RejectionStreak, Unit, as_kernel, core_kernel
 from auvest.models import MeasurementModel, ProcessModel, from_description
 from auvest.models._base import UNSAVED
-from auvest.models.functions import FunctionProcess, require_none_raised
+from auvest.models.functions import FunctionProcess, FunctionSensor, require_none_raised
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -55,6 +58,9 @@ _UNIT = Unit()
 _POSITION = ("x_m", "y_m", "z_m")
 _STEP_SIGMA_M = 0.1
 _REPORT = ("innovation", "S", "standardised", "weight")
+_LARGEST_REPORT = 6  # numbers of a measurement
+_STATUSES = {int(status) for status in Status.__members__.values()}
+_DECISIONS = {int(decision) for decision in Decision.__members__.values()}
 
 
 class GaussianFilter:
@@ -68,6 +74,8 @@ class GaussianFilter:
     _linearisation: ClassVar[int]
     #: Whether it asks models for their Jacobians.
     _jacobians: ClassVar[bool] = False
+    #: Of the thread that is in :meth:`run`.
+    _run: object
 
     def __init__(
         self,
@@ -481,6 +489,9 @@ class GaussianFilter:
             cannot measure, a place far from the origin, numbers that overflow. ``step`` names it,
             ``partial`` holds the results before it, and the filter stays at the row before; a
             further ``run`` may go on behind the row.
+        Interrupted
+            After Ctrl-C, a ``KeyboardInterrupt`` within half a second: ``partial`` holds the
+            results so far, and the filter stays at their last row.
         """
         as_flag("covariance", covariance)
         handles, which = self._as_sensor_rows(sensor)
@@ -510,7 +521,20 @@ class GaussianFilter:
             "sensor": which,
         }
         before = self._before_functions()
-        done, status, columns = self._filter.run(record, handles, covariance)
+        with self._taken() as core:
+            done, status, columns, interrupted = in_slices(
+                count,
+                8 if self._slow else first_slice(),
+                lambda first, end: core.run(
+                    {
+                        name: None if column is None else column[first:end]
+                        for name, column in record.items()
+                    },
+                    handles,
+                    covariance,
+                ),
+                Status.ok,
+            )
         if status == Status.ok:
             self._require_functions_done(before)
         for name in ("P", "S") if not covariance else ():
@@ -538,7 +562,27 @@ class GaussianFilter:
             except Exception as cause:
                 raise error from cause
             raise error
+        if interrupted:
+            raise Interrupted(result)
         return result
+
+    @property
+    def _slow(self) -> bool:
+        """Whether every step calls functions of Python."""
+        models = (self._process, *self._sensors.values())
+        return any(isinstance(model, (FunctionProcess, FunctionSensor)) for model in models)
+
+    @contextmanager
+    def _taken(self) -> Iterator[_Filter[Any]]:
+        """Keep other threads out between the slices of a record too."""
+        if vars(self).setdefault("_run", token := object()) is not token:  # atomic
+            self._filter.x  # noqa: B018  (says that the filter is in use)
+        core, self._filter = self._filter, InUse()  # type: ignore[assignment]
+        try:
+            yield core
+        finally:
+            self._filter = core
+            del self._run
 
     # ---- State ----------------------------------------------------------------------------------
 
@@ -584,28 +628,72 @@ class GaussianFilter:
             parameters and precision. The filter is then unchanged.
         """
         arrays = unpack(state, type(self).__name__, self._description())
+        require(arrays, self._saved_dtypes(), optional="report_")
+        if arrays["status"].shape != () or int(arrays["status"]) not in _STATUSES:
+            raise ValueError("state is damaged: there is no such status")
         status = Status(int(arrays.pop("status")))
-        models = json.loads(arrays.pop("event_models").tobytes())
-        own = {handle.description: handle for handle in self._handles.values()}
-        handles = [own.get(json.dumps(model)) or self._rebuilt(model) for model in models]
-        events = [None if k < 0 else handles[k] for k in arrays.pop("event_sensor")]
-        report: dict[str, Any] | None = None
-        if "report_nis" in arrays:
-            flags = [int(flag) for flag in arrays.pop("report_flags")]
-            report = {name: arrays.pop(f"report_{name}").ravel() for name in _REPORT}
-            report["nis"] = float(arrays.pop("report_nis"))
-            report["near_field"], report["recovered"] = bool(flags[0]), bool(flags[3])
-            report["decision"], report["iterations"] = Decision(flags[1]), flags[2]
+        self._require_interval(arrays["policy"])
+        events = self._remembered(arrays.pop("event_models"), arrays.pop("event_sensor"))
+        report = _saved_report(arrays)
+        twin = self._filter.copy()
         try:
-            self._filter.restore(arrays, events)
+            twin.restore(arrays, events)
         except _core.StatusError as error:
             raise ValueError(f"state is refused: {error}") from None
-        self._filter.set_report(report, status)
+        twin.set_report(report, status)
+        self._filter = twin
+
+    def _saved_dtypes(self) -> dict[str, npt.DTypeLike]:
+        """Give the arrays of a saved state."""
+        numbers = ("x", "P", "input", "policy", "recovery", "base", "events")
+        report = (*(f"report_{name}" for name in _REPORT), "report_nis")
+        whole = ("status", "event_sensor", "report_flags")
+        return {
+            **dict.fromkeys((*numbers, *report), self._dtype),
+            **dict.fromkeys(whole, np.dtype(np.int64)),
+            "event_models": np.dtype(np.uint8),
+        }
+
+    def _require_interval(self, saved: Floats) -> None:
+        """Refuse an interval, and a memory of the interval law, that the policy cannot have."""
+        if self._policy is None or len(saved) != 9:  # how many there are is the core's to say
+            return
+        number = self._dtype.type
+        law: dict[str, tuple[float, float]] = {}
+        if isinstance(self._policy, FixedInterval):
+            law["interval"] = (self._policy.interval_s, self._policy.interval_s)
+        else:
+            law["interval"] = (self._policy.min_s, self._policy.max_s)
+        if isinstance(self._policy, MahalanobisInterval):
+            law["tau"] = (self._policy.tau_min, self._policy.tau_max)
+            law["interval of the law"] = law["interval"]
+            law["ratio"] = (0.0, self._policy.ratio_max)
+            law["mahalanobis_squared"] = (0.0, np.inf)
+        places = ("interval", "tau", "interval of the law", "ratio", "mahalanobis_squared")
+        for name, value in zip(places, saved, strict=False):
+            low, high = law.get(name, (-np.inf, np.inf))
+            if not number(low) <= value <= number(high):
+                raise ValueError(f"state is damaged: {name} is {value}, limits {low} and {high}")
+
+    def _remembered(
+        self, models: npt.NDArray[np.uint8], sensor: npt.NDArray[np.int64]
+    ) -> list[_Sensor[Any] | None]:
+        """Give the core's sensor of each event; None where it is a prediction."""
+        try:
+            described = json.loads(models.tobytes())
+            own = {handle.description: handle for handle in self._handles.values()}
+            handles = [own.get(json.dumps(model)) or self._rebuilt(model) for model in described]
+        except (ValueError, TypeError, RecursionError) as error:
+            raise ValueError(f"state is damaged: its models cannot be made: {error}") from None
+        if sensor.ndim != 1 or ((sensor < -1) | (sensor >= len(handles))).any():
+            raise ValueError("state is damaged: an event names a sensor that is not there")
+        return [None if k < 0 else handles[k] for k in sensor]
 
     def _rebuilt(self, description: dict[str, Any]) -> _Sensor[Any]:
         model: MeasurementModel = as_instance(
             "state", from_description(description), MeasurementModel
         )
+        model.check_process(self._process)
         return model.core(len(self._process.state), self._dtype)
 
     def _description(self) -> dict[str, Any]:
@@ -831,6 +919,30 @@ class GaussianFilter:
             return type(sensor).__name__, sensor
         name = next(iter(self._sensors)) if sensor is None else sensor
         return name, self._sensors[name]
+
+
+def _saved_report(arrays: dict[str, npt.NDArray[Any]]) -> dict[str, Any] | None:
+    """Take the report out of the arrays of a saved state."""
+    if "report_nis" not in arrays:
+        return None
+    found: dict[str, Any] = {name: arrays.pop(f"report_{name}") for name in _REPORT}
+    nis, flags = arrays.pop("report_nis"), arrays.pop("report_flags")
+    size = found["innovation"].size
+    right = nis.shape == () and flags.shape == (4,) and found["S"].shape == (size, size)
+    right = right and all(found[name].shape == (size,) for name in _REPORT if name != "S")
+    if not right or not 1 <= size <= _LARGEST_REPORT or ((flags < 0) | (flags > 255)).any():
+        raise ValueError("state is damaged: its report is none")
+    if int(flags[1]) not in _DECISIONS:
+        raise ValueError("state is damaged: there is no such decision")
+    report = {name: array.ravel() for name, array in found.items()}
+    return {
+        **report,
+        "nis": float(nis),
+        "near_field": bool(flags[0]),
+        "decision": Decision(int(flags[1])),
+        "iterations": int(flags[2]),
+        "recovered": bool(flags[3]),
+    }
 
 
 def _as_sensors(sensors: Sensors, process: ProcessModel) -> dict[str, MeasurementModel]:

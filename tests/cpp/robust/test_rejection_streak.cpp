@@ -125,7 +125,8 @@ Course among_two_leaders(double direction, std::uint64_t seed, std::uint64_t run
   return course;
 }
 
-TEST_CASE("lock-out: the same with two leaders that move, the paper's geometry") {
+TEST_CASE("lock-out: the same with two leaders that move, the paper's geometry" *
+          doctest::test_suite("statistics")) {
   for (int d = 0; d < 12; ++d) {
     const double direction = (d + 0.5) * auvest::math::pi<double>() / 6;
     CAPTURE(direction);
@@ -442,7 +443,8 @@ int false_recoveries(double outlier_sigma_m) {
   return recoveries;
 }
 
-TEST_CASE("lock-out: outliers are hardly ever taken for a wrong prior") {
+TEST_CASE("lock-out: outliers are hardly ever taken for a wrong prior" *
+          doctest::test_suite("statistics")) {
   // 33,120 ranges each.
   CHECK(false_recoveries(10) <= 3);
   CHECK(false_recoveries(30) <= 1);

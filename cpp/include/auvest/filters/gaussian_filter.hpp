@@ -142,6 +142,9 @@ class GaussianFilter {
   const Process& process() const { return process_; }
 
  protected:
+  /// For a filter of several beliefs, which takes each through the steps in turn.
+  BeliefType& belief_in_place() { return belief_; }
+
   /// Linearises, then lets `rule` move the belief, as SquareRootUpdate does.
   template <class Model, class Rule, class Report>
   AUVEST_INLINE Status correct(const typename Model::Measurement& z, const Model& model,

@@ -63,6 +63,10 @@ class Robust : public Filter {
   Status check() const { return rule_check_ != Status::kOk ? rule_check_ : Filter::check(); }
   const Rule& rule() const { return rule_; }
 
+ protected:
+  /// For a filter of several beliefs, which share a recovery.
+  Rule& rule_in_place() { return rule_; }
+
  private:
   Rule rule_;
   Status rule_check_;

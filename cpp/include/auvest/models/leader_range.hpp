@@ -54,6 +54,7 @@ struct LeaderRange : MeasurementModel<LeaderRange<Scalar_, N>, Scalar_, N, 1, 2>
   using typename Base::State;
   static constexpr bool kClosedForm = true;
   static constexpr int kPlace = 2;
+  static constexpr bool kCircle = true;
 
   using Params = LeaderRangeParams<Scalar>;
 
@@ -65,6 +66,12 @@ struct LeaderRange : MeasurementModel<LeaderRange<Scalar_, N>, Scalar_, N, 1, 2>
   void place(const Scalar* p) {
     params.leader_x_m = p[0];
     params.leader_y_m = p[1];
+  }
+
+  /// Where the leader stands [m].
+  void centre(Scalar* p) const {
+    p[0] = params.leader_x_m;
+    p[1] = params.leader_y_m;
   }
 
   struct Expansion {

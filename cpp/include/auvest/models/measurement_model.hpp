@@ -24,6 +24,8 @@
 //     kPlace, place(p)            how many numbers come with each measurement and are no part of it
 //                                 (where a station or a leader stood, how an instrument was
 //                                 headed), and their setter: for records in which they change
+//     kCircle, centre(p)          true where the measurement is the distance of the first two
+//                                 states from a point (p[0], p[1]), and that point: for GaussianSum
 //     near_field(point, P, z, innovation, noise)
 //                                 for a model with M = Observed: true where h is useless at the
 //                                 scale of the belief; the filter then takes the measurement as one
@@ -52,6 +54,7 @@ struct MeasurementModel {
   static constexpr int kObserved = Observed;
   static constexpr bool kClosedForm = false;
   static constexpr int kPlace = 0;
+  static constexpr bool kCircle = false;
 
   /// h about x, with deviations by subtraction (wrapped by `residual`).
   struct NumericExpansion {
