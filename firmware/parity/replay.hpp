@@ -76,6 +76,7 @@ class Replay {
   template <class Filter>
   void replay(const Filter& start) {
     AdaptiveInterval<Filter, Policy> filter(start, policy_);
+    filter.limit_steps(math::infinity());  // a record goes to the ends of the format
     typename Filter::State x0;
     typename Filter::Covariance p0;
     p0.setZero();

@@ -113,6 +113,7 @@ class RobustRecord:
             recovery=recovery,
             residual=self.residual,
             late_s=self.late_s,
+            longest_step_s=np.inf,
             dtype="float32",
         )
         trace = np.zeros(len(self.steps), trace_type(self.states))

@@ -56,7 +56,6 @@ _UPDATE = _core.robust_update_defaults()
 _FIXED = FixedInterval()
 _UNIT = Unit()
 _POSITION = ("x_m", "y_m", "z_m")
-_STEP_SIGMA_M = 0.1
 _REPORT = ("innovation", "S", "standardised", "weight")
 _LARGEST_REPORT = 6  # numbers of a measurement
 _STATUSES = {int(status) for status in Status.__members__.values()}
@@ -145,15 +144,22 @@ class GaussianFilter:
             ) from None
 
     def _require_local(self, state: Floats, covariance: Floats) -> None:
-        """Refuse a start where what a craft moves between two steps is rounded away.
+        """Refuse a start where motion is rounded away, however little is known of the position.
 
-        However little is known of where it is, steps are of the size of _STEP_SIGMA_M or less.
+        What counts is how far the process lets the position go in a second. (Functions of Python
+        are not asked: they are in float64, and may raise.)
         """
+        if isinstance(self._process, FunctionProcess) or self._process.lacks:
+            return
+        before = np.asarray(covariance, np.float64)
+        phi = self._process.Phi(1.0, state)
+        growth = np.diagonal(phi @ before @ phi.T + self._process.Q(1.0) - before)
         is_coarse = getattr(_core, f"is_coarse_{self._dtype.name}")
-        position = [i for i, name in enumerate(self._process.state) if name in _POSITION]
-        sigmas = np.minimum(np.diagonal(covariance), _STEP_SIGMA_M**2)
-        if any(is_coarse(float(state[i]), float(sigmas[i])) for i in position):
-            raise ValueError(far_from_origin("x0", state[position], self._dtype))
+        largest = float(np.finfo(self._dtype).max)
+        place = [i for i, name in enumerate(self._process.state) if name in _POSITION]
+        for i in place:
+            if growth[i] > 0 and is_coarse(float(state[i]), min(float(growth[i]), largest)):
+                raise ValueError(far_from_origin("x0", state[place], self._dtype))
 
     def _build(self) -> None:
         self._filter = self._core_filter(self._policy)

@@ -4,12 +4,14 @@
 // multiple of 0.25, and what a craft moves in a tenth of a second is rounded away. One rule serves
 // starts, beliefs, stations and leaders:
 //
-//     coarse: half a unit in the last place of x is more than about a tenth of sigma
+//     coarse: half a unit in the last place of x is more than about a tenth of sigma,
+//             where no sigma counts as less than a millimetre
 //
 // Rounding then adds at most a hundredth of the variance, less than any model is right by; beyond,
-// it is a noise that no filter knows of. Read from the exponents, in a few instructions: with
-// |x| in [2^a, 2^(a+1)) and sigma^2 in [2^b, 2^(b+1)) the half unit is 2^(a - digits), and it is
-// compared with 2^(b/2) / 8, which is sigma / 8 to sigma / 11.3.
+// it is a noise that no filter knows of. What is known to a millimetre is known, for a vehicle:
+// within 4 km of the origin no float is coarse, however sure a filter is. Read from the exponents,
+// in a few instructions: with |x| in [2^a, 2^(a+1)) and sigma^2 in [2^b, 2^(b+1)) the half unit is
+// 2^(a - digits), and it is compared with 2^(b/2) / 8, which is sigma / 8 to sigma / 11.3.
 #pragma once
 
 #include <cfloat>
@@ -40,14 +42,19 @@ AUVEST_INLINE int stored_exponent(double x) {
 
 }  // namespace detail
 
-/// True where the format cannot tell numbers apart at `x` as a variance asks for it.
+/// The exponent of the square of a millimetre, about, beside that of 1.
+constexpr int kFinestExponent = -20;
+
+/// True where the format cannot tell numbers apart at `x`, in metres, as a variance asks for it.
 AUVEST_OUTLINE AUVEST_INLINE bool is_coarse(const float& x, const float& variance) {
-  return 2 * detail::stored_exponent(x) - detail::stored_exponent(variance) >
-         127 + 2 * FLT_MANT_DIG - 6;
+  int known = detail::stored_exponent(variance);
+  if (known < 127 + kFinestExponent) known = 127 + kFinestExponent;
+  return 2 * detail::stored_exponent(x) - known > 127 + 2 * FLT_MANT_DIG - 6;
 }
 AUVEST_INLINE bool is_coarse(double x, double variance) {
-  return 2 * detail::stored_exponent(x) - detail::stored_exponent(variance) >
-         1023 + 2 * DBL_MANT_DIG - 6;
+  int known = detail::stored_exponent(variance);
+  if (known < 1023 + kFinestExponent) known = 1023 + kFinestExponent;
+  return 2 * detail::stored_exponent(x) - known > 1023 + 2 * DBL_MANT_DIG - 6;
 }
 
 }  // namespace math
