@@ -252,7 +252,9 @@ def _record(program: str) -> bytes:
     )
     start = np.concatenate([filter_.x, np.diagonal(filter_.P)])
     result = simulate(filter_, scenario, workers=1)
-    rows = np.hstack([result.z[0], result.truth[0]])
+    z = result.z[0].copy()
+    z[:, 0] = np.abs(z[:, 0])  # no sonar reports a range below 0; the noise of the scenario does
+    rows = np.hstack([z, result.truth[0]])
     end = np.full(4, np.nan)
     return np.concatenate([start, rows.ravel(), end]).astype("<f4").tobytes()
 
