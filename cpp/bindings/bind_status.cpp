@@ -14,7 +14,8 @@ void bind_status(py::module_& m) {
       .value("alpha_too_small", Status::kAlphaTooSmall)
       .value("overflow", Status::kOverflow)
       .value("unstable_step", Status::kUnstableStep)
-      .value("steep_pitch", Status::kSteepPitch);
+      .value("steep_pitch", Status::kSteepPitch)
+      .value("step_too_long", Status::kStepTooLong);
   m.def("describe", static_cast<const char* (*)(Status)>(&describe), py::arg("status"),
         "One line of English for a status.");
 

@@ -57,6 +57,9 @@ COMMANDS: Mapping[tuple[str, ...], str] = {
     ("reproduce", "slat-cases"): (
         "Cases in which SlatfJoint and the IMM earn their place, and by how much."
     ),
+    ("reproduce", "slat-robust"): (
+        "SLAT filters that know how far off they are, and find a lost master again."
+    ),
     ("reproduce", "mrclam6"): (
         "Track real robots that see each other, with one setting for all tracks."
     ),

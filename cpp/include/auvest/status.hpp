@@ -18,7 +18,8 @@ enum class Status : std::uint8_t {
   kAlphaTooSmall,        ///< alpha cancels all digits of a model without closed-form deviations
   kOverflow,             ///< the result would not be finite
   kUnstableStep,         ///< the time step is longer than the hull's largest stable one
-  kSteepPitch            ///< pitch is beyond 80 degrees, where Euler angles fail
+  kSteepPitch,           ///< pitch is beyond 80 degrees, where Euler angles fail
+  kStepTooLong           ///< dt is longer than the filter's longest_step_s: a clock that jumped?
 };
 
 /// One line of English for each status, without a full stop.
@@ -44,6 +45,8 @@ inline const char* describe(Status status) {
       return "the time step is unstable";
     case Status::kSteepPitch:
       return "pitch is beyond 80 degrees";
+    case Status::kStepTooLong:
+      return "dt exceeds longest_step_s";
   }
   return "unknown status";
 }
