@@ -54,8 +54,8 @@ class NewFolder:
         Replace the results of another command too, and set aside for good, as ``NAME.old``, a
         folder that auvest has not made.
     precious : bool
-        What was written cannot be made again: an unfinished folder is then not removed without
-        ``force``.
+        What was written cannot be made again: it stays where it is if it is not published, and no
+        other run removes it without ``force``.
 
     Attributes
     ----------
@@ -65,6 +65,8 @@ class NewFolder:
         Where to write until it is published.
     kept : Path or None
         Where what auvest had not made was set aside.
+    left : Path or None
+        Where what is precious and was not published is.
 
     Raises
     ------
@@ -79,8 +81,10 @@ class NewFolder:
     ) -> None:
         self.path = path
         self.kept: Path | None = None
+        self.left: Path | None = None
         self._command = command
         self._force = force
+        self._precious = precious
         self._lock = -1
         absolute = Path.cwd() / path
         if absolute.name in ("", "..") or path.name == "":
@@ -137,8 +141,12 @@ class NewFolder:
                 _remove(self._old)
 
     def discard(self) -> None:
-        """Remove what was written, unless it is published; safe to call at any time."""
+        """Remove what was written, unless it is published or precious; safe to call at any time."""
         if self._lock >= 0:
+            if self._precious and _names(self.part) - {MANIFEST}:
+                self.left = self.part
+                self._unlock()
+                return
             with contextlib.suppress(OSError):
                 _remove(self.part)
                 for folder in self._made:

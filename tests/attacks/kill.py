@@ -38,6 +38,7 @@ from auvest import montecarlo, telemetry
 from auvest._outputs import MANIFEST, OLD, UNFINISHED
 from auvest.cli import app
 from auvest.commands import reproduce
+from auvest.commands.console import discard_unpublished
 
 #: Both inputs of every command.
 VARIANTS = ("a", "b")
@@ -147,7 +148,10 @@ class Reproduce(Attack):
         option = Annotated[int, typer.Option("--runs")]
         made.command()(reproduce.command(measure, page, lambda _: [], figures=False, runs=option))
         runs = str(1 + VARIANTS.index(variant))
-        made(["--runs", runs, "--output", str(root / "out")], standalone_mode=False)
+        try:
+            call("--runs", runs, "--output", root / "out", of=made)
+        finally:
+            discard_unpublished()  # as auvest.cli does
 
 
 class Capture(Attack):
@@ -296,9 +300,9 @@ def attack(name: str, times: int, seed: int, root: Path) -> Counter[str]:
     return counts
 
 
-def call(*arguments: object) -> None:
-    """Call the command line in this process."""
-    code = app([*map(str, arguments), "--quiet"], standalone_mode=False)
+def call(*arguments: object, of: typer.Typer = app) -> None:
+    """Call the command line in this process; any end but the good one is raised."""
+    code = of([*map(str, arguments), "--quiet"], standalone_mode=False)
     if code:
         raise RuntimeError(f"exit code {code}")
 

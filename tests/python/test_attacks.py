@@ -164,3 +164,24 @@ def test_an_echo_beside_a_missing_one_needs_a_master(kind):
             f.update(z)
         assert refused.value.status == auvest.Status.bad_parameter
     f.update([[np.nan, np.nan], [np.nan, np.nan]])  # nothing was heard
+
+
+def test_a_state_with_a_correlation_beyond_1_is_refused():
+    """1e38 beside small variances: elimination of P meets a pivot that is no number."""
+    f = auvest.Ekf(
+        np.ones(6),
+        np.diag([0.28, 0.19, 4e-4, 4e-4, 8e-5, 8e-5]),
+        process=auvest.ConstantAcceleration(),
+        sensors=auvest.RangeBearing(),
+        dtype="float32",
+    )
+    header, payload = states.opened(f.save())
+    names = [row[0] for row in header["arrays"]]
+    assert names[:2] == ["x", "P"]
+    p = f.P
+    p[4, 0] = p[0, 4] = 1e38
+    payload[24 : 24 + p.nbytes] = p.tobytes()
+    before = f.save()
+    with pytest.raises(ValueError, match="state is"):
+        f.restore(states.closed(header, bytes(payload)))
+    assert f.save() == before

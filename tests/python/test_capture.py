@@ -490,3 +490,23 @@ def test_without_the_simulator_its_build_is_told(
     result = call("--simulator", __file__, "--output", str(tmp_path))
     assert result.exit_code == 1
     assert "AUVEST_BUILD_FIRMWARE" in plain(result.stderr)
+
+
+def test_a_record_stays_if_what_comes_after_it_fails(
+    port: PortWithBoard, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def script(board: PortWithBoard) -> None:
+        board.say(HEADER)
+        for k in range(1, 4):
+            board.say(sample_line(k))
+
+    def full(*_: object) -> None:
+        raise OSError("no space left")
+
+    monkeypatch.setattr(capture, "_figure", full)
+    port.speak(script)
+    result = call("--port", port.name, "--steps", "3", "--output", str(tmp_path / "dive"))
+    assert result.exit_code == 1
+    assert "what was recorded is in" in plain(result.stderr)
+    assert lines_of(tmp_path / "dive.unfinished" / "record.csv") == 4
+    assert not (tmp_path / "dive").exists()

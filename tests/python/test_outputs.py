@@ -162,6 +162,20 @@ def test_a_stop_between_the_two_names_is_mended(tmp_path: Path) -> None:
     assert files(tmp_path) == {"out/a.csv": "old"}
 
 
+def test_what_is_precious_stays_where_it_is(tmp_path: Path) -> None:
+    with (
+        pytest.raises(OSError, match="full"),
+        NewFolder(tmp_path / "out", "capture", precious=True),
+    ):
+        raise OSError("the disk is full")
+    assert list(tmp_path.iterdir()) == []  # nothing had come
+    new = NewFolder(tmp_path / "out", "capture", precious=True)
+    (new.part / "record.csv").write_text("1,2\n")
+    new.discard()
+    assert new.left == tmp_path / "out.unfinished"
+    assert files(tmp_path) == {"out.unfinished/record.csv": "1,2\n"}
+
+
 def test_an_unfinished_folder_of_somebody_else_is_refused(tmp_path: Path) -> None:
     (tmp_path / "out.unfinished").mkdir()
     (tmp_path / "out.unfinished" / "thesis.tex").write_text("mine")

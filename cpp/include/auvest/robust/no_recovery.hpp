@@ -7,6 +7,7 @@
 //                                               replaced
 //     bool   after(correction, a, root, belief) told of every update; may widen the belief, and
 //                                               says whether it did. H = A L^-1 (A: `a`, L: `root`)
+//     bool   exhausted() const                  true while it would widen but has done so too often
 //     Status check() const                      kOk, or kBadParameter if a parameter is out of
 //     range
 #pragma once
@@ -31,6 +32,8 @@ struct NoRecovery {
              const Matrix<Scalar, O, O>&, Belief<Scalar, N>&) {
     return false;
   }
+
+  bool exhausted() const { return false; }
 
   Status check() const { return Status::kOk; }
 };

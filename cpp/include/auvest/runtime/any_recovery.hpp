@@ -22,6 +22,8 @@ struct AnyRecovery {
     return enabled && streak.after(correction, a, root, belief);
   }
 
+  bool exhausted() const { return enabled && streak.exhausted(); }
+
   Status check() const { return streak.check(); }
 };
 
