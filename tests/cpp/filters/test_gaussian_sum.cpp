@@ -690,6 +690,9 @@ TEST_CASE_TEMPLATE("a refused call changes nothing, a restored filter goes on wi
     CHECK(filter.update(Vector<Scalar, 1>(nan), without).status == Status::kNotFinite);
     const auvest::Position<Scalar, 2, 2> fix;
     CHECK(filter.update(Vector<Scalar, 2>(largest, largest), fix).status != Status::kOk);
+    CHECK(filter.update(Vector<Scalar, 1>(Scalar(-1)), leader<Scalar>(0, 0)).status ==
+          Status::kImpossibleRange);
+    CHECK(filter.predict(Scalar(3601), input) == Status::kStepTooLong);
     CHECK(same_state(filter, before));
 
     auto twin = Some<Scalar>::filter();
@@ -1021,6 +1024,7 @@ int right_of(int runs, int components, int headings) {
       LeaderRange<double, 3> sensor;
       double there[2];
       const double z = world.range(range % 3, there);
+      sensor.params.lift_smallest();
       sensor.params.leader_x_m = there[0];
       sensor.params.leader_y_m = there[1];
       REQUIRE(filter.update(Vector<double, 1>(z), sensor).status == Status::kOk);
