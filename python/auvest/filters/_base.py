@@ -515,7 +515,7 @@ class GaussianFilter:
                 _require_rows("reference", track, count)
         elif reference is not None:
             raise TypeError("reference must be None: this filter has no interval policy")
-        record = {
+        record: dict[str, Any] = {
             "z": rows,
             "dt": np.full(count, np.nan, self._dtype)
             if dt is None
@@ -639,6 +639,9 @@ class GaussianFilter:
             raise ValueError("state is damaged: there is no such status")
         status = Status(int(arrays.pop("status")))
         self._require_interval(arrays["policy"])
+        states = len(self._process.state)
+        _require_correlations(arrays["P"], states)
+        _require_correlations(arrays["base"][states : states + states * states], states)
         events = self._remembered(arrays.pop("event_models"), arrays.pop("event_sensor"))
         report = _saved_report(arrays)
         twin = self._filter.copy()
@@ -893,7 +896,7 @@ class GaussianFilter:
         *,
         dt: Any = None,
         z: Any = None,
-        sensor: str | MeasurementModel | None = None,
+        sensor: Any = None,
         place: Any = None,
     ) -> str:
         """Explain a status that says less than is known here; empty for the others."""
@@ -906,7 +909,7 @@ class GaussianFilter:
         if status == Status.impossible_range:
             name, model = self._named_sensor(sensor)
             limits = ""
-            if hasattr(model, "smallest_range_m"):
+            if hasattr(model, "smallest_range_m") and hasattr(model, "largest_range_m"):
                 limits = (
                     f"; its ranges are {model.smallest_range_m:g} to {model.largest_range_m:g} m"
                 )
@@ -925,6 +928,16 @@ class GaussianFilter:
             return type(sensor).__name__, sensor
         name = next(iter(self._sensors)) if sensor is None else sensor
         return name, self._sensors[name]
+
+
+def _require_correlations(saved: Floats, states: int) -> None:
+    """Refuse a covariance with a correlation beyond 1, whose elimination may leave the range."""
+    if saved.size != states * states:  # how many there are is the core's to say
+        return
+    covariance = saved.reshape(states, states).astype(np.float64)
+    sigma = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
+    if (np.abs(covariance) > 1.001 * np.outer(sigma, sigma)).any():
+        raise ValueError("state is damaged: its covariance has a correlation beyond 1")
 
 
 def _saved_report(arrays: dict[str, npt.NDArray[Any]]) -> dict[str, Any] | None:

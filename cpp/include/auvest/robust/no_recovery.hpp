@@ -3,6 +3,8 @@
 // A recovery policy is a plain struct that offers
 //
 //     void   restart()                          forget the past
+//     void   forget()                           forget what was rejected: the belief has been
+//                                               replaced
 //     bool   after(correction, a, root, belief) told of every update; may widen the belief, and
 //                                               says whether it did. H = A L^-1 (A: `a`, L: `root`)
 //     bool   exhausted() const                  true while it would widen but has done so too often
@@ -23,6 +25,7 @@ struct NoRecovery {
   explicit NoRecovery(const Params& = Params()) {}
 
   void restart() {}
+  void forget() {}
 
   template <int M, int O, int N>
   bool after(const RobustCorrection<Scalar, M>&, const Matrix<Scalar, M, O>&,

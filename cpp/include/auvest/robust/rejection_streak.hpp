@@ -60,6 +60,13 @@ struct RejectionStreak {
 
   explicit RejectionStreak(const Params& p = Params()) : params(p) { restart(); }
 
+  /// What was rejected speaks against a belief that is gone.
+  void forget() {
+    count = 0;
+    variance = Scalar(0);
+    math::set_zero(recent);
+  }
+
   void restart() {
     count = 0;
     widened = 0;

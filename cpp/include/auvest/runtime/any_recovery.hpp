@@ -14,6 +14,7 @@ struct AnyRecovery {
   RejectionStreak<Scalar> streak;
 
   void restart() { streak.restart(); }
+  void forget() { streak.forget(); }
 
   template <int M, int O, int N>
   bool after(const RobustCorrection<Scalar, M>& correction, const Matrix<Scalar, M, O>& a,
