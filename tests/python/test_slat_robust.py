@@ -114,7 +114,7 @@ def test_one_covariance_needs_known_masters():
 
 def test_slatf_says_that_its_covariance_is_too_small():
     scenario = paper_scenario(LEVELS[3], runs=1)
-    one = Slatf(START, CERTAIN, particles=20, sonar=scenario.sonar)
+    one = Slatf(START, CERTAIN, particles=20, resample_below=1, sonar=scenario.sonar)
     one.add_master(*MASTER)
     assert not one.overconfident
     time_s = np.arange(61.0)
