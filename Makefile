@@ -44,7 +44,9 @@ apt = missing=$$(comm -23 <(tr ' ' '\n' <<< "$(1)" | sort) \
 BUILD_REQUIRES = $(shell sed -nE 's/^requires = \[(.*)\]/\1/p' pyproject.toml | tr -d '",')
 PIP_INSTALL = $(PY) -m pip install --quiet --disable-pip-version-check
 
-.PHONY: setup setup-dev install install-editable
+# Users get the newest packages within the bounds of pyproject.toml; tests and linters run with those
+# of tests/requirements.lock, to the byte.
+.PHONY: setup setup-dev install install-editable lock
 setup: $(VENV)/.auvest-setup ## install what is missing: Debian packages to build, .venv
 setup-dev: $(VENV)/.auvest-setup-dev ## the same, with all that the tests and linters need
 install: $(VENV)/.auvest-normal ## install the Python package and the command auvest
@@ -53,19 +55,30 @@ install-editable: $(VENV)/.auvest-editable ## install it so that edits of Python
 $(VENV)/.auvest-setup: pyproject.toml
 	$(call apt,$(PACKAGES))
 	test -x $(PY) || python3 -m venv $(VENV)
+	touch $@
+
+$(VENV)/.auvest-setup-dev: $(VENV)/.auvest-setup tests/requirements.lock
+	$(call apt,$(DEV_PACKAGES))
+	$(PIP_INSTALL) --require-hashes -r tests/requirements.lock
+	touch $@
+
+$(VENV)/.auvest-build-requires: $(VENV)/.auvest-setup
 	$(PIP_INSTALL) $(foreach r,$(BUILD_REQUIRES),'$(r)')
 	touch $@
 
-$(VENV)/.auvest-setup-dev: $(VENV)/.auvest-setup
-	$(call apt,$(DEV_PACKAGES))
-	touch $@
+lock: setup ## renew tests/requirements.lock: the newest packages within the bounds of pyproject.toml
+	test -x build/lock/bin/uv || { python3 -m venv build/lock && build/lock/bin/pip install -q uv; }
+	printf '%s\n' $(foreach r,$(BUILD_REQUIRES),'$(r)') > build/lock/build.in
+	build/lock/bin/uv pip compile --quiet --upgrade --universal --python-version 3.10 \
+	    --generate-hashes --no-annotate --custom-compile-command 'make lock' \
+	    --extra test --extra dev --output-file tests/requirements.lock pyproject.toml build/lock/build.in
 
-$(VENV)/.auvest-normal: $(VENV)/.auvest-setup $(CORE_FILES) $(shell find python -name '*.py' -o -name '*.pyi')
+$(VENV)/.auvest-normal: $(VENV)/.auvest-build-requires $(CORE_FILES) $(shell find python -name '*.py' -o -name '*.pyi')
 	$(PIP_INSTALL) --no-build-isolation .
 	rm -f $(VENV)/.auvest-editable && touch $@
 
 $(VENV)/.auvest-editable: $(VENV)/.auvest-setup-dev $(CORE_FILES)
-	$(PIP_INSTALL) --no-build-isolation --editable '.[test,dev]'
+	$(PIP_INSTALL) --no-build-isolation --no-deps --editable .
 	rm -f $(VENV)/.auvest-normal && touch $@
 
 # ---- Use -----------------------------------------------------------------------------------------
@@ -80,7 +93,7 @@ reproduce: install ## every table and figure of the papers, beside ours
 	$(VENV)/bin/auvest reproduce slatf
 	$(VENV)/bin/auvest reproduce mekf
 
-wheel: setup ## a wheel of the package in dist/
+wheel: $(VENV)/.auvest-build-requires ## a wheel of the package in dist/
 	$(PY) -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .
 	@ls dist/*.whl
 
@@ -101,8 +114,8 @@ capture: board install ## run tracking_loop on the simulated board: table and pi
 
 # ---- Test ----------------------------------------------------------------------------------------
 
-.PHONY: test test-cpp test-cpp-matrix test-firmware test-python
-test: test-python test-firmware test-cpp test-cpp-matrix ## all tests
+.PHONY: test test-cpp test-cpp-matrix test-firmware test-python fuzz
+test: test-python test-firmware test-cpp test-cpp-matrix fuzz ## all tests
 
 test-python: install-editable ## the Python tests
 	$(PY) -m pytest tests/python
@@ -123,7 +136,7 @@ test-cpp-matrix: $(MATRIX) ## the C++ tests under sanitizers: clang, C++20
 .PHONY: $(PAIRS) build-release
 $(PAIRS): matrix-%: setup-dev
 	cmake -S . -B build/$@ -G Ninja --log-level=WARNING -D AUVEST_BUILD_TESTS=ON \
-	    -D AUVEST_SANITIZE=ON -D CMAKE_BUILD_TYPE=Debug -D CMAKE_CXX_FLAGS_DEBUG='-O1 -g1' \
+	    -D AUVEST_SANITIZE=ON -D CMAKE_BUILD_TYPE=Debug -D CMAKE_CXX_FLAGS_DEBUG=-g1 \
 	    -D CMAKE_CXX_COMPILER=$(if $(findstring clang,$@),clang++,g++) \
 	    -D CMAKE_CXX_STANDARD=$(lastword $(subst -, ,$@))
 	cmake --build build/$@
@@ -133,6 +146,19 @@ build-release: setup-dev
 	cmake -S . -B build/release -G Ninja --log-level=WARNING -D AUVEST_BUILD_TESTS=ON \
 	    -D AUVEST_BUILD_EXAMPLES=ON -D AUVEST_BUILD_BENCHMARKS=ON -D AUVEST_BUILD_TOOLS=ON
 	cmake --build build/release
+
+# What libFuzzer finds goes to build/fuzz/crash-*. A long run is worth optimised code:
+# make fuzz SECONDS=1800 FUZZ_BUILD=Release
+SECONDS := 15
+PRECISION := float
+FUZZ_BUILD := Debug
+fuzz: setup-dev ## libFuzzer on the filters: SECONDS=15, PRECISION=float
+	cmake -S . -B build/fuzz/$(FUZZ_BUILD) -G Ninja --log-level=WARNING -D AUVEST_BUILD_FUZZ=ON \
+	    -D CMAKE_BUILD_TYPE=$(FUZZ_BUILD) -D CMAKE_CXX_FLAGS_DEBUG='-O0 -g1' \
+	    -D CMAKE_CXX_FLAGS_RELEASE='-O1 -g1' -D CMAKE_CXX_COMPILER=clang++
+	cmake --build build/fuzz/$(FUZZ_BUILD) --target fuzz_$(PRECISION)
+	build/fuzz/$(FUZZ_BUILD)/tests/attacks/fuzz_$(PRECISION) -artifact_prefix=build/fuzz/ \
+	    -max_total_time=$(SECONDS) -timeout=60 -print_final_stats=1 -print_funcs=0 -verbosity=0
 
 # ---- Measure -------------------------------------------------------------------------------------
 

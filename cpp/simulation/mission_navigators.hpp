@@ -131,48 +131,54 @@ RangeBearing<Scalar, N> sonar_as(const UsblDevice& usbl) {
   p.station_y_m = Scalar(usbl.station_m[1]);
   p.sigma_range_m = Scalar(usbl.noise_m);
   p.sigma_bearing_rad = Scalar(usbl.noise_rad);
+  p.lift_smallest();  // the noise may take the range below 0
   return RangeBearing<Scalar, N>(p);
 }
 
-/// A filter of the position, with kernel, recovery and interval policy.
-template <class Scalar, class Core, int N>
+/// A filter of the position, with kernel, recovery and interval policy. A fix that is late by the
+/// clocks of the scenario is taken at the time at which it was valid.
+template <class Scalar, class Core>
 struct FilterNavigator : Navigator<Scalar> {
+  static const int kStates = Core::Process::kStates;
   using Plain = Robust<Core, RobustUpdate<AnyKernel<Scalar>, AnyRecovery<Scalar>>>;
   using Filter = AdaptiveInterval<Plain, AnyInterval<Scalar>>;
+  using Sonar = RangeBearing<Scalar, kStates>;
+  /// Predictions and fixes of the last 6 s.
+  using Memory = LateMemory<Plain, Sonar, EventArray<LateEvent<Plain, Sonar>, 64>>;
 
   Filter filter;
   Status started;
+  bool late;
+  Memory memory;
 
-  FilterNavigator(const MissionScenario& s, const Core& core)
+  FilterNavigator(const MissionScenario& s, const Core& core, const double (&x0)[kStates],
+                  const double (&deviations)[kStates])
       : filter(Plain(core, rule_as<Scalar>(s)), interval_as<Scalar>(s.interval)),
-        started(Status::kOk) {}
-
-  void start(const double* x0, const double* deviations) {
-    typename Filter::State mean;
-    typename Filter::Covariance p;
-    math::set_zero(p);
-    for (int i = 0; i < N; ++i) {
-      mean(i) = Scalar(x0[i]);
-      p(i, i) = Scalar(deviations[i] * deviations[i]);
-    }
-    started = filter.reset(mean, p);
-    read();
-  }
+        started(start(x0, deviations)),
+        late(s.usbl.sound_m_s > 0 || s.usbl_timing.latency_s > 0),
+        memory(filter) {}
 
   Status check() const { return started; }
   Scalar interval() const { return filter.interval(); }
   Status feedback(const Vector<Scalar, 2>& reference) { return filter.feedback(reference); }
 
-  void read() {
-    this->x = filter.x()(0);
-    this->y = filter.x()(1);
+  Status predict(Scalar dt, const Vector<Scalar, 3>& input) {
+    const Status status = late ? memory.predict(filter, dt, input) : filter.predict(dt, input);
+    read();
+    return status;
   }
 
-  template <class Report>
-  Status report(const Report& correction) {
+  Status update(const Vector<Scalar, 2>& z, const UsblDevice& usbl, Scalar age) {
+    const Sonar sonar = sonar_as<Scalar, kStates>(usbl);
+    const auto correction = late ? memory.update(filter, z, sonar, age) : filter.update(z, sonar);
     this->nis = static_cast<double>(correction.nis);
     read();
     return correction.status;
+  }
+
+  void read() {
+    this->x = filter.x()(0);
+    this->y = filter.x()(1);
   }
 
   /// Against the true position and, by the last two of four numbers, `rates`.
@@ -193,12 +199,38 @@ struct FilterNavigator : Navigator<Scalar> {
     position = mahalanobis_squared(place, block);
     all = mahalanobis_squared(error, p);
   }
+
+ private:
+  Status start(const double (&x0)[kStates], const double (&deviations)[kStates]) {
+    typename Filter::State mean;
+    typename Filter::Covariance p;
+    math::set_zero(p);
+    for (int i = 0; i < kStates; ++i) {
+      mean(i) = Scalar(x0[i]);
+      p(i, i) = Scalar(deviations[i] * deviations[i]);
+    }
+    const Status status = filter.reset(mean, p);
+    read();
+    return status;
+  }
+};
+
+/// Constant acceleration, which looks at nothing that drives it.
+template <class Scalar>
+struct FreeAcceleration : ExactAcceleration<Scalar> {
+  using Input = Vector<Scalar, 3>;
+  Input input;
+
+  explicit FreeAcceleration(const AccelerationNoise<Scalar>& noise)
+      : ExactAcceleration<Scalar>(noise) {
+    math::set_zero(input);
+  }
 };
 
 template <class Scalar>
-struct UkfNavigator : FilterNavigator<Scalar, Ukf<ExactAcceleration<Scalar>>, 6> {
-  using Process = ExactAcceleration<Scalar>;
-  using Base = FilterNavigator<Scalar, Ukf<Process>, 6>;
+struct UkfNavigator : FilterNavigator<Scalar, Ukf<FreeAcceleration<Scalar>>> {
+  using Process = FreeAcceleration<Scalar>;
+  using Base = FilterNavigator<Scalar, Ukf<Process>>;
 
   static Process process(const MissionScenario& s) {
     AccelerationNoise<Scalar> noise;
@@ -207,23 +239,11 @@ struct UkfNavigator : FilterNavigator<Scalar, Ukf<ExactAcceleration<Scalar>>, 6>
   }
 
   UkfNavigator(const MissionScenario& s, const double* start, double heading)
-      : Base(s, Ukf<Process>(process(s))) {
-    const double x0[6] = {
-        start[0], start[1], s.speed_m_s * math::cos(heading), s.speed_m_s * math::sin(heading),
-        0,        0};
-    const double deviations[6] = {1, 1, 0.5, 0.5, 0.1, 0.1};
-    this->start(x0, deviations);
-  }
+      : Base(s, Ukf<Process>(process(s)),
+             {start[0], start[1], s.speed_m_s * math::cos(heading),
+              s.speed_m_s * math::sin(heading), 0, 0},
+             {1, 1, 0.5, 0.5, 0.1, 0.1}) {}
 
-  Status predict(Scalar dt, const Vector<Scalar, 3>&) {
-    const Status status = this->filter.predict(dt);
-    this->read();
-    return status;
-  }
-  /// A fix is taken when it arrives, however old: this process has no input to do again.
-  Status update(const Vector<Scalar, 2>& z, const UsblDevice& usbl, Scalar) {
-    return this->report(this->filter.update(z, sonar_as<Scalar, 6>(usbl)));
-  }
   /// The truth has position and velocity over ground.
   void judge(const VehicleTruth& truth, const double*, double& position, double& all) const {
     Base::judge(truth, truth.velocity, position, all);
@@ -231,16 +251,9 @@ struct UkfNavigator : FilterNavigator<Scalar, Ukf<ExactAcceleration<Scalar>>, 6>
 };
 
 template <class Scalar>
-struct ModelAidedNavigator : FilterNavigator<Scalar, Ekf<SpeedHeadingCurrent<Scalar>>, 4> {
+struct ModelAidedNavigator : FilterNavigator<Scalar, Ekf<SpeedHeadingCurrent<Scalar>>> {
   using Process = SpeedHeadingCurrent<Scalar>;
-  using Base = FilterNavigator<Scalar, Ekf<Process>, 4>;
-  using Sonar = RangeBearing<Scalar, 4>;
-  using Plain = typename Base::Plain;
-  /// Predictions and fixes of the last 6 s.
-  using Memory = LateMemory<Plain, Sonar, EventArray<LateEvent<Plain, Sonar>, 64>>;
-
-  bool late;
-  Memory memory;
+  using Base = FilterNavigator<Scalar, Ekf<Process>>;
 
   static Process process(const MissionScenario& s) {
     typename Process::Params p;
@@ -250,37 +263,23 @@ struct ModelAidedNavigator : FilterNavigator<Scalar, Ekf<SpeedHeadingCurrent<Sca
   }
 
   ModelAidedNavigator(const MissionScenario& s, const double* start, double)
-      : Base(s, Ekf<Process>(process(s))),
-        late(s.usbl.sound_m_s > 0 || s.usbl_timing.latency_s > 0),
-        memory(started_filter(start)) {}
-
-  const Plain& started_filter(const double* start) {
-    const double x0[4] = {start[0], start[1], 0, 0};
-    const double deviations[4] = {1, 1, 0.3, 0.3};
-    this->start(x0, deviations);
-    return this->filter;
-  }
+      : Base(s, Ekf<Process>(process(s)), {start[0], start[1], 0, 0}, {1, 1, 0.3, 0.3}) {}
 
   Status predict(Scalar dt, const Vector<Scalar, 3>& input) {
-    const Status status =
-        late ? memory.predict(this->filter, dt, input) : this->filter.predict(dt, input);
-    read();
+    const Status status = Base::predict(dt, input);
+    read_current();
     return status;
   }
   Status update(const Vector<Scalar, 2>& z, const UsblDevice& usbl, Scalar age) {
-    const Sonar sonar = sonar_as<Scalar, 4>(usbl);
-    const Status status = late ? this->report(memory.update(this->filter, z, sonar, age))
-                               : this->report(this->filter.update(z, sonar));
-    read();
+    const Status status = Base::update(z, usbl, age);
+    read_current();
     return status;
   }
-  void read() {
-    Base::read();
+
+ private:
+  void read_current() {
     this->current[0] = this->filter.x()(2);
     this->current[1] = this->filter.x()(3);
-  }
-  void judge(const VehicleTruth& truth, const double* flow, double& position, double& all) const {
-    Base::judge(truth, flow, position, all);
   }
 };
 

@@ -11,7 +11,7 @@ import numbers
 import os
 import threading
 from collections.abc import Mapping
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, NoReturn, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -61,10 +61,43 @@ def as_instance(name: str, value: object, expected: type | tuple[type, ...]) -> 
     return value
 
 
+#: Units by how the names of arguments end, the longest first.
+_UNITS = (
+    ("_rad_s", "rad/s"),
+    ("_rev_s", "rev/s"),
+    ("_m_s2", "m/s^2"),
+    ("_m_s", "m/s"),
+    ("_mps", "m/s"),
+    ("_rad", "rad"),
+    ("_m2", "m^2"),
+    ("_kg", "kg"),
+    ("_s", "s"),
+    ("_m", "m"),
+)
+#: What NumPy and Python take for numbers, and what would be taken without its unit.
+_NO_NUMBERS = (bool, np.bool_, np.timedelta64, np.datetime64)
+
+
+def _not_a_number(name: str, kind: str, given: str) -> TypeError:
+    """Say what was given in place of a number, and in which unit the number would be."""
+    unit = "s" if name == "dt" else next((u for end, u in _UNITS if name.endswith(end)), "")
+    hint = f"; its unit is {unit}" if unit else ""
+    bare = given.removeprefix("of ")
+    if unit == "s" and bare.startswith("timedelta64"):
+        hint += f": {name} / np.timedelta64(1, 's')"
+    elif unit == "s" and bare == "timedelta":
+        hint += f": {name}.total_seconds()"
+    return TypeError(f"{name} must be {kind}, not {given}{hint}")
+
+
+def _is_number(value: object, kind: type) -> bool:
+    return isinstance(value, kind) and not isinstance(value, _NO_NUMBERS)
+
+
 def as_integer(name: str, value: object, low: int, high: int) -> int:
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, numbers.Integral):
-        raise TypeError(f"{name} must be an integer, not {type(value).__name__}")
-    number = int(value)
+    if not _is_number(value, numbers.Integral):
+        raise _not_a_number(name, "an integer", type(value).__name__)
+    number = int(value)  # type: ignore[call-overload]
     if not low <= number <= high:
         raise ValueError(f"{name} must lie in {low}..{high}, not {number}")
     return number
@@ -77,11 +110,11 @@ def as_number(name: str, value: object, bound: Bound = "any", *, infinite: bool 
     """Take a finite real number; ``infinite`` also allows +inf."""
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, numbers.Real):
-        hint = f" of shape {value.shape}" if isinstance(value, np.ndarray) else ""
-        raise TypeError(f"{name} must be a number, not {type(value).__name__}{hint}")
+    if not _is_number(value, numbers.Real):
+        shape = f" of shape {value.shape}" if isinstance(value, np.ndarray) else ""
+        raise _not_a_number(name, "a number", f"{type(value).__name__}{shape}")
     try:
-        number = float(value)
+        number = float(value)  # type: ignore[arg-type]
     except OverflowError:
         number = math.inf
     if not math.isfinite(number) and not (infinite and number == math.inf):
@@ -103,6 +136,21 @@ def require_range(
         if size > float(limits.max) or (value != 0 and size < float(limits.tiny)):
             what = f"the square of {name}" if name in squared else name
             raise ValueError(f"{name} = {value} does not suit {dtype}: {what} leaves its range")
+
+
+def far_from_origin(name: str, place: Floats, dtype: DType) -> str:
+    """Say that coordinates, m, are too large for a precision, and what to do."""
+    coordinates = [float(value) for value in place if math.isfinite(value)]
+    largest = max(coordinates, key=abs)
+    step = float(np.spacing(np.abs(dtype.type(largest))))
+    unit = 10.0 ** max(0, math.floor(math.log10(abs(largest))) - 2)
+    origin = ", ".join(f"{round(value / unit) * unit:.0f}" for value in coordinates)
+    given = ", ".join(f"{value:.10g}" for value in coordinates)
+    return (
+        f"{name} = ({given}) is too far from the origin: {dtype.name} tells {step:.3g} m apart "
+        f"there, which is coarse against the sigmas. Subtract a local origin, such as ({origin}), "
+        "from all coordinates"
+    )
 
 
 def as_pair(name: str, value: object) -> tuple[float, float]:
@@ -225,8 +273,22 @@ def as_real(name: str, value: object, shape: tuple[int | None, ...]) -> npt.NDAr
         raise ValueError(f"{name} must be {expected}, not rows of different lengths") from None
     if raw.dtype.kind not in "fiu":
         given = "str" if raw.dtype.kind in "US" else raw.dtype.name
-        raise TypeError(f"{name} must be {expected} of real numbers, not of {given}")
+        if raw.dtype == object:
+            odd = next((x for x in raw.flat if not _is_number(x, numbers.Real)), None)
+            given = "object" if odd is None else type(odd).__name__
+        raise _not_a_number(name, f"{expected} of real numbers", f"of {given}")
+    if isinstance(value, (list, tuple)) and _holds_flag(value):  # NumPy makes numbers of them
+        raise _not_a_number(name, f"{expected} of real numbers", "of bool")
     return raw
+
+
+def _holds_flag(value: object) -> bool:
+    """Whether True or False stands among numbers in nested lists."""
+    if isinstance(value, (list, tuple)):
+        return any(map(_holds_flag, value))
+    if isinstance(value, np.ndarray):
+        return value.dtype == bool
+    return isinstance(value, (bool, np.bool_))
 
 
 def _check_shape(name: str, raw: npt.NDArray[Any], shape: tuple[int | None, ...]) -> None:
@@ -268,15 +330,35 @@ def as_workers(workers: int | None) -> int:
     return processors() if workers is None else as_integer("workers", workers, 1, 256)
 
 
+class InUse:
+    """Stands in the place of what another thread is using: says so when it is asked for anything.
+
+    In a process that was forked meanwhile, that thread does not exist.
+    """
+
+    def __init__(self) -> None:
+        self.__dict__["process"] = os.getpid()
+
+    def __getattr__(self, name: str) -> NoReturn:
+        raise RuntimeError(
+            "this filter is in use by another thread; use one per thread"
+            if self.__dict__["process"] == os.getpid()
+            else "this process was forked while another thread was using this filter, which stays "
+            "unusable here: copy the filter before, or fork before"
+        )
+
+
 class Exclusive:
     """Refuses the second thread that enters while the first is inside."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
+        self._user = InUse()
 
     def __enter__(self) -> None:
         if not self._lock.acquire(blocking=False):
-            raise RuntimeError("this filter is in use by another thread; use one per thread")
+            self._user.asked  # noqa: B018  (raises)
+        self._user = InUse()
 
     def __exit__(self, *_: object) -> None:
         self._lock.release()

@@ -89,12 +89,46 @@ def unpack(state: object, kind: str, description: Description) -> dict[str, npt.
         raise ValueError(f"state is that of another {kind}: {'; '.join(found)}")
     arrays = {}
     at = 0
-    for name, dtype, shape in header["arrays"]:
-        count = math.prod(shape)
-        array = np.frombuffer(payload, dtype, count, at)
+    for name, dtype, shape in _table(header, len(payload)):
+        array = np.frombuffer(payload, dtype, math.prod(shape), at)
         arrays[name] = array.reshape(shape).astype(array.dtype.newbyteorder("="))
         at += array.nbytes
     return arrays
+
+
+def require(
+    arrays: Mapping[str, npt.NDArray[Any]], dtypes: Mapping[str, npt.DTypeLike], optional: str = ""
+) -> None:
+    """Refuse arrays that are not those of a state.
+
+    Parameters
+    ----------
+    arrays : mapping of str to ndarray
+        As :func:`unpack` gives them.
+    dtypes : mapping of str to dtype
+        What there must be. Floats must be finite.
+    optional : str
+        How the names begin of arrays that may be there as well: all of them or none.
+
+    Raises
+    ------
+    ValueError
+        If one is missing, of another type, or not finite, or there is one too many.
+    """
+    wanted = dict(dtypes)
+    if optional and not any(name.startswith(optional) for name in arrays):
+        wanted = {name: dtype for name, dtype in dtypes.items() if not name.startswith(optional)}
+    for name in sorted(wanted.keys() ^ arrays.keys()):
+        raise ValueError(f"state is damaged: {name} is {'missing' if name in wanted else 'new'}")
+    for name in wanted:
+        array = arrays[name]
+        if array.dtype != np.dtype(dtypes[name]):
+            raise ValueError(
+                f"state is damaged: {name} is of {array.dtype.name}, "
+                f"expected {np.dtype(dtypes[name]).name}"
+            )
+        if array.dtype.kind == "f" and not np.isfinite(array).all():
+            raise ValueError(f"state is damaged: {name} has a number that is not finite")
 
 
 def describe(value: Any) -> Any:
@@ -128,8 +162,36 @@ def _open(state: object) -> tuple[dict[str, Any], memoryview]:
     if version != VERSION:
         raise ValueError(f"state has version {version} of the format, expected {VERSION}")
     body = raw[_PREFIX.size : -_CHECKSUM.size]
-    header: dict[str, Any] = json.loads(bytes(body[:header_length]))
+    try:
+        header = json.loads(bytes(body[:header_length]))
+    except (ValueError, RecursionError):
+        raise ValueError("state is damaged: its header is no JSON") from None
+    if not isinstance(header, dict) or not {"kind", "description", "arrays"} <= header.keys():
+        raise ValueError("state is damaged: its header lacks kind, description or arrays")
     return header, body[header_length:]
+
+
+def _table(header: Mapping[str, Any], size: int) -> list[tuple[str, str, list[int]]]:
+    """Give name, dtype and shape of the arrays, which take ``size`` bytes."""
+    table = header["arrays"]
+    found, bytes_taken = [], 0
+    for row in table if isinstance(table, list) else [table]:
+        name, dtype, shape = row if isinstance(row, list) and len(row) == 3 else (None, None, None)
+        if (
+            not isinstance(name, str)
+            or dtype not in _DTYPES
+            or not isinstance(shape, list)
+            or not all(type(extent) is int and 0 <= extent <= size for extent in shape)
+            or len(shape) > 2
+        ):
+            raise ValueError(f"state is damaged: its arrays have {_short(row)}")
+        found.append((name, dtype, shape))
+        bytes_taken += np.dtype(dtype).itemsize * math.prod(shape)
+    if bytes_taken != size or len({name for name, _, _ in found}) < len(found):
+        raise ValueError(
+            f"state is damaged: its arrays say that they have {bytes_taken} bytes, it has {size}"
+        )
+    return found
 
 
 def _differences(have: Any, want: Any, path: str = "") -> list[str]:

@@ -21,6 +21,7 @@ from auvest.commands.exit_codes import EXIT_CODES
 #: First line of help of each command, by the words that call it.
 COMMANDS: Mapping[tuple[str, ...], str] = {
     ("capture",): "Record what the sketch tracking_loop reports: a CSV file, a figure, a table.",
+    ("check",): "Check a log before it is used: what is there, and what may be wrong with it.",
     ("cost",): (
         "Measure a filter with your models on the simulated MEGA2560: flash, RAM, stack, cycles."
     ),
@@ -28,6 +29,7 @@ COMMANDS: Mapping[tuple[str, ...], str] = {
     ("import",): "Turn a published recording into logs for 'auvest replay'.",
     ("mission",): "Play the vehicle that the sketch mission steers, on a board or simulated.",
     ("replay",): "Replay recorded runs through a filter.",
+    ("version",): "Show the version, and what this build lacks.",
     ("simulate", "aukf"): (
         "Simulate the AUKF paper's scenario and show errors, intervals and consistency."
     ),
@@ -56,6 +58,9 @@ COMMANDS: Mapping[tuple[str, ...], str] = {
     ),
     ("reproduce", "slat-cases"): (
         "Cases in which SlatfJoint and the IMM earn their place, and by how much."
+    ),
+    ("reproduce", "mistakes"): (
+        "Put the usual mistakes into clean simulated logs, and see what 'auvest check' says."
     ),
     ("reproduce", "slat-robust"): (
         "SLAT filters that know how far off they are, and find a lost master again."
@@ -92,13 +97,17 @@ def _lazy(words: tuple[str, ...], line: str) -> type[TyperCommand]:
 
     class Lazy(TyperCommand):
         def make_context(self, *arguments: Any, **options: Any) -> Any:
+            from auvest.commands.console import discard_unpublished
+
             found = import_module(_module(words))
             real = typer.Typer(rich_markup_mode="rich", add_completion=False)
             about = (found.__doc__ or "").partition("\n\n")[2]
             about = about.replace("Examples\n--------\n", "Examples:\n\n")
             text = f"{line}\n\n{about}\n{EXIT_CODES}\n"
             real.command(self.name, help=text)(found.command)
-            return typer.main.get_command(real).make_context(*arguments, **options)
+            context = typer.main.get_command(real).make_context(*arguments, **options)
+            context.call_on_close(discard_unpublished)
+            return context
 
     return Lazy
 
@@ -118,9 +127,9 @@ _grow()
 
 def _show_version(wanted: bool) -> None:
     if wanted:
-        from auvest.commands.version import version
+        from auvest.commands.version import lines
 
-        typer.echo(f"auvest {version()}")
+        typer.echo("\n".join(lines()))
         raise typer.Exit
 
 
@@ -159,6 +168,8 @@ def _main(
       auvest reproduce logs              real recordings: our filters beside the baselines
 
       auvest reproduce mrclam6           real robots: SLATF and EKF-SLAT with an IMM master
+
+      auvest check my_log                what is wrong with a recording, before it is used
 
       auvest replay --help               your own recordings through any filter
 

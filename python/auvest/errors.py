@@ -48,5 +48,19 @@ def _rebuild(action: str, status: Status, step: int | None, partial: Any, hint: 
     return FilterError(action, status, step=step, partial=partial, hint=hint)
 
 
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C during work that keeps what was done.
+
+    Attributes
+    ----------
+    partial : object
+        What was done, as it would have been returned; None: nothing.
+    """
+
+    def __init__(self, partial: Any) -> None:
+        super().__init__()
+        self.partial = partial
+
+
 class ModelError(ValueError):
     """A header with models cannot be loaded; the message begins with the line that is wrong."""

@@ -8,9 +8,11 @@ stood.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
-import shutil
+import re
+import stat
 import zipfile
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor, as_completed
@@ -21,26 +23,13 @@ import numpy as np
 import numpy.typing as npt
 
 from auvest._arguments import as_integer, as_workers
+from auvest._outputs import UNFINISHED, new_file
+from auvest.errors import Interrupted as Interrupted
 
 Columns: TypeAlias = dict[str, npt.NDArray[Any]]
 #: ``task(first, count)`` does the runs ``first .. first + count - 1``, without the GIL if it can.
 #: All arrays have one row per run, or all the same number of rows.
 Task: TypeAlias = Callable[[int, int], Mapping[str, npt.NDArray[Any]]]
-
-
-class Interrupted(KeyboardInterrupt):
-    """Ctrl-C during :func:`run`.
-
-    Attributes
-    ----------
-    partial : dict of ndarray, or None
-        The columns of the chunks that are done, in the order of the runs; None: there are none.
-        Functions that simulate by :func:`run` put what they return in its place.
-    """
-
-    def __init__(self, partial: Any) -> None:
-        super().__init__()
-        self.partial = partial
 
 
 def chunk_for(runs: int, rows: int, workers: int | None = None) -> int:
@@ -78,8 +67,9 @@ def run(
         Called as ``progress(runs_done, runs)`` in the calling thread.
     store : Path, optional
         Folder for the finished chunks; made if missing. What is there from a call with the same
-        ``settings`` and ``chunk`` is taken over; anything else there is of another experiment and
-        removed. Delete it with :func:`discard` when the results are safe.
+        ``settings`` and ``chunk`` is taken over; the chunks of another experiment are removed. A
+        folder that holds anything else is refused. Delete it with :func:`discard` when the results
+        are safe.
     settings : mapping, optional
         What the results depend on, for JSON. Must be given with ``store``.
 
@@ -91,9 +81,10 @@ def run(
     Raises
     ------
     ValueError, TypeError
-        If an argument is wrong.
+        If an argument is wrong, or ``store`` holds what no call has written there.
     Interrupted
-        After Ctrl-C; the chunks that are done are kept.
+        After Ctrl-C; ``partial`` holds the columns of the chunks that are done, in the order of the
+        runs. Functions that simulate by :func:`run` put what they return in its place.
     """
     total = as_integer("runs", runs, 1, 2**53)
     size = as_integer("chunk", chunk, 1, 2**53)
@@ -141,8 +132,19 @@ def run(
 
 
 def discard(store: Path) -> None:
-    """Remove the chunks that :func:`run` keeps in this folder."""
-    shutil.rmtree(store, ignore_errors=True)
+    """Remove the chunks that :func:`run` keeps in this folder, and the folder if nothing is left.
+
+    What :func:`run` has not written stays.
+    """
+    if store.is_symlink() or not _is_label(store / _LABEL):
+        return
+    there = [entry.name for entry in store.iterdir()]
+    own = [name for name in there if _CHUNK.fullmatch(name) or _NEW_LABEL.fullmatch(name)]
+    with contextlib.suppress(OSError):
+        for name in own:
+            (store / name).unlink()
+        (store / _LABEL).unlink()  # last: until then the folder is known for what it is
+        store.rmdir()
 
 
 def write_table(path: Path, columns: Mapping[str, npt.NDArray[Any]]) -> Path:
@@ -162,9 +164,8 @@ def write_table(path: Path, columns: Mapping[str, npt.NDArray[Any]]) -> Path:
         If the path ends otherwise.
     """
     tidy = {name: values for name, values in columns.items() if values.ndim == 1}
-    new = path.with_name(path.name + ".new")
     if path.suffix == ".csv":
-        with new.open("w", encoding="utf-8", newline="") as file:
+        with new_file(path, "w", encoding="utf-8", newline="") as file:
             file.write(",".join(tidy) + "\n")
             for row in zip(*(values.tolist() for values in tidy.values()), strict=True):
                 file.write(",".join("" if cell != cell else str(cell) for cell in row) + "\n")
@@ -172,10 +173,10 @@ def write_table(path: Path, columns: Mapping[str, npt.NDArray[Any]]) -> Path:
         import pyarrow  # here, because it is slow to import
         from pyarrow import parquet
 
-        parquet.write_table(pyarrow.table(tidy), new)
+        with new_file(path) as file:
+            parquet.write_table(pyarrow.table(tidy), file)
     else:
         raise ValueError(f"the table must end in .csv or .parquet, not {path.name!r}")
-    new.replace(path)
     return path
 
 
@@ -193,6 +194,22 @@ def _join(parts: dict[int, Columns]) -> Columns:
     return {name: np.concatenate([part[name] for part in ordered]) for name in ordered[0]}
 
 
+#: What a store holds: which experiment it is of, and chunks, some of them unfinished.
+_LABEL = "experiment"
+_CHUNK = re.compile(rf"\d+-\d+\.npz(\.\w+{re.escape(UNFINISHED)})?")
+_NEW_LABEL = re.compile(rf"{_LABEL}\.\w+{re.escape(UNFINISHED)}")
+_HASH = re.compile(r"[0-9a-f]{64}")
+
+
+def _is_label(path: Path) -> bool:
+    """Whether this is the file by which a store is known."""
+    try:
+        plain = stat.S_ISREG(path.lstat().st_mode)
+        return plain and _HASH.fullmatch(path.read_text(encoding="utf-8")) is not None
+    except (OSError, ValueError):
+        return False
+
+
 class _Store:
     """Finished chunks of one experiment, a file each that is there as a whole or not at all."""
 
@@ -200,25 +217,33 @@ class _Store:
         text = json.dumps(identity, sort_keys=True, default=str)
         self._folder = folder
         name = hashlib.sha256(text.encode()).hexdigest()
-        label = folder / "experiment"
-        if not (label.is_file() and label.read_text(encoding="utf-8") == name):
-            discard(folder)
-            folder.mkdir(parents=True)
-            label.write_text(name, encoding="utf-8")
+        if folder.is_symlink():
+            raise ValueError(f"store: {folder} is a link: name the folder itself")
+        label = folder / _LABEL
+        if _is_label(label) and label.read_text(encoding="utf-8") == name:
+            return
+        discard(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        foreign = sorted(
+            entry.name for entry in folder.iterdir() if not _NEW_LABEL.fullmatch(entry.name)
+        )
+        if foreign:
+            raise ValueError(
+                f"store: {folder} holds what no run has written ({foreign[0]!r}): name another"
+            )
+        with new_file(label, "w", encoding="utf-8") as file:
+            file.write(name)
 
     def _path(self, first: int, count: int) -> Path:
         return self._folder / f"{first}-{first + count - 1}.npz"
 
     def write(self, first: int, count: int, columns: Columns) -> None:
-        path = self._path(first, count)
-        new = path.with_suffix(".new")
-        with new.open("wb") as file:
+        with new_file(self._path(first, count)) as file:
             np.savez(file, **columns)  # type: ignore[arg-type]
-        new.replace(path)
 
     def read(self, first: int, count: int) -> Columns | None:
         path = self._path(first, count)
-        if not path.is_file():
+        if path.is_symlink() or not path.is_file():
             return None
         try:
             with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:

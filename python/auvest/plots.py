@@ -6,16 +6,21 @@ style, so they can be used in any program and thread; :func:`save` writes one as
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from matplotlib import rc_context, rcdefaults
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
+
+from auvest._outputs import new_file
 
 Floats = npt.NDArray[np.float64]
 
@@ -289,16 +294,33 @@ def slave_figure(
     return figure
 
 
+@contextmanager
+def own_style() -> Iterator[None]:
+    """Draw as matplotlib comes, whatever the user's own matplotlibrc asks for.
+
+    With it a figure has the same bytes for everybody, and needs no LaTeX. It changes what is global
+    in matplotlib for its time: it is for commands.
+    """
+    with rc_context(), warnings.catch_warnings():
+        rcdefaults()
+        # A name in letters that the font has not is drawn with boxes.
+        warnings.filterwarnings("ignore", message=r"Glyph \d+", category=UserWarning)
+        yield
+
+
 def save(figure: Figure, path: Path) -> Path:
     """Write a figure as PNG, the same bytes for the same figure, and return the path."""
-    figure.savefig(path, format="png", dpi=DPI, metadata={"Software": None})
+    with new_file(path) as file:
+        figure.savefig(file, format="png", dpi=DPI, metadata={"Software": None})
     return path
 
 
 def new_figure(size: tuple[float, float], title: str) -> Figure:
     """Make an empty figure of that size in inches."""
     figure = Figure(figsize=size, dpi=DPI, layout="constrained")
-    figure.suptitle(title, fontsize=12)
+    # Names stand in titles: a dollar sign begins no formula, and bytes may be no text.
+    drawn = title.encode("utf-8", "backslashreplace").decode("utf-8")
+    figure.suptitle(drawn, fontsize=12, parse_math=False)
     return figure
 
 

@@ -20,6 +20,9 @@ Row = dict[str, float]
 
 _COLUMNS = "# columns: "
 _BITS = re.compile(r"[0-9a-f]{8}")
+_DECIMALS = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]{1,3})?")
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_COUNT = re.compile(r"[0-9]{1,10}")
 #: Columns that are always decimal: eight digits there are not the bits of a float.
 _DECIMAL = frozenset(
     {"sample", "time_s", "resamplings", "status", "missed", "refused", "late", "awake_us"}
@@ -57,9 +60,10 @@ def requested_sample(line: str, request: str = "PING") -> int | None:
     if not line.startswith(f"${request},"):
         return None
     try:
-        return int(body_of(line).removeprefix(f"{request},"))
-    except ValueError:
+        count = body_of(line).removeprefix(f"{request},")
+    except LineError:
         return None
+    return int(count) if _COUNT.fullmatch(count) else None
 
 
 def answer(sample: int, range_m: float, bearing_rad: float) -> str:
@@ -99,7 +103,10 @@ class Reader:
             If the line is damaged, or a sample comes before the names of its columns.
         """
         if line.startswith(_COLUMNS):
-            self.columns = tuple(line.removeprefix(_COLUMNS).split(","))
+            names = tuple(line.removeprefix(_COLUMNS).split(","))
+            if len(set(names)) < len(names) or not all(map(_NAME.fullmatch, names)):
+                raise LineError(f"the names of the columns are damaged: reset the board: {line!r}")
+            self.columns = names
             return None
         if not line or line.startswith("#"):
             return None
@@ -118,7 +125,11 @@ class Reader:
 
 
 def _checksum(body: str) -> int:
-    return reduce(xor, body.encode("latin-1"), 0)
+    try:
+        return reduce(xor, body.encode("latin-1"), 0)
+    except UnicodeEncodeError as error:
+        character = body[error.start : error.end]
+        raise LineError(f"no character of a serial line: {character!r}") from None
 
 
 def _number(name: str, cell: str) -> float:
@@ -126,4 +137,10 @@ def _number(name: str, cell: str) -> float:
         return math.nan
     if name not in _DECIMAL and _BITS.fullmatch(cell):
         return struct.unpack(">f", bytes.fromhex(cell))[0]
-    return math.nan if cell == "ovf" else float(cell)
+    if cell in ("ovf", "nan"):  # what Arduino prints where there is no number
+        return math.nan
+    if not _DECIMALS.fullmatch(
+        cell
+    ):  # float() also takes what no sketch sends: 1_0, foreign digits
+        raise ValueError(cell)
+    return float(cell)

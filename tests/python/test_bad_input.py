@@ -45,8 +45,8 @@ CONSTRUCTORS = {
     "x0 complex": (ukf(X0 + 1j, P0), TypeError, r"x0 must be .*, not of complex128"),
     "x0 bool": (ukf([True] * 6, P0), TypeError, r"x0 must be .*, not of bool"),
     "x0 object": (ukf([None] * 6, P0), TypeError, r"x0 must be .*, not of object"),
-    "x0 Decimal": (ukf([Decimal(1)] * 6, P0), TypeError, r"x0 must be .*, not of object"),
-    "x0 dict": (ukf({}, P0), TypeError, r"x0 must be .*, not of object"),
+    "x0 Decimal": (ukf([Decimal(1)] * 6, P0), TypeError, r"x0 must be .*, not of Decimal"),
+    "x0 dict": (ukf({}, P0), TypeError, r"x0 must be .*, not of dict"),
     "x0 masked": (ukf(np.ma.masked_equal(X0, 0), P0), TypeError, r"x0 must .*; use x0\.filled"),
     "x0 column": (
         ukf(X0[:, None], P0),

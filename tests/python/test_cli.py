@@ -46,6 +46,26 @@ def test_version() -> None:
     result = call("--version")
     assert result.exit_code == 0
     assert result.stdout.startswith("auvest ")
+    assert call("version").stdout == result.stdout
+    assert len(result.stdout.splitlines()) == 1  # this build lacks nothing
+
+
+def test_a_build_without_xsimd_says_so() -> None:
+    """At import and with the version, in one line each."""
+    without = "from auvest import _core; _core.slat_lanes = lambda single: ['scalar']\n"
+    code = f"{without}import auvest; auvest.Slatf; auvest.EkfSlat"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    told = [line for line in done.stderr.splitlines() if "xsimd" in line]
+    assert len(told) == 1
+    assert "RuntimeWarning: auvest was built without xsimd: " in told[0]
+    code = f"{without}from auvest.cli import app; app(['version'])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    name, line = done.stdout.splitlines()
+    assert name.startswith("auvest ")
+    assert line.startswith("built without xsimd: ")
+    assert "libxsimd-dev" in line
 
 
 @pytest.mark.parametrize(
@@ -318,7 +338,8 @@ def interrupt_after(seconds: float, command: list[str], cwd: Path) -> tuple[int,
     """Run a command, interrupt it at work, and return its exit code, stdout and stderr."""
     output = cwd / f"after-{seconds}"
     program = start_program([*command, "--output", output], cwd=cwd)
-    wait_until(output.exists, "the work has not begun", program)  # made just before it
+    part = output.with_name(f"{output.name}.unfinished")
+    wait_until(part.exists, "the work has not begun", program)  # made just before it
     time.sleep(seconds)
     program.send_signal(signal.SIGINT)
     out, err = program.communicate(timeout=PATIENCE_S)

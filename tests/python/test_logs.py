@@ -48,8 +48,8 @@ HEAD = "time_s,source,range_m\n"
         (HEAD + "1,0,5\n2,0,", 3, None, "truncated"),
         (HEAD + "1,0,5\n2,0\n", 3, None, "2 cells, expected 3"),
         (HEAD + "1,0,5\n2,0,6", 3, None, "line end"),
-        (HEAD + "1,0,5\n\n", 3, None, "1 cells, expected 3"),
-        (HEAD + "\n", 2, None, "1 cells, expected 3"),
+        (HEAD + "1,0,5\n\n2,0,6\n", 3, None, "1 cells, expected 3"),
+        (HEAD + "\n1,0,5\n", 2, None, "1 cells, expected 3"),
         (HEAD + "1,0,5,9\n", 2, None, "4 cells, expected 3"),
         # NaN-ridden
         (HEAD + "1,0,nan\n", 2, "range_m", "leave out the row"),
@@ -98,6 +98,48 @@ def test_suspects_the_unit(
     with pytest.raises(LogError, match=suspicion) as caught:
         read(path)
     assert caught.value.column == column
+
+
+@pytest.mark.parametrize("lines", [1, 2, 1000])
+@pytest.mark.parametrize("end", ["\n", "\n\n \n", "\r\n\t\n", "  "])
+def test_blank_lines_at_the_end_are_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lines: int, end: str
+) -> None:
+    monkeypatch.setattr(reader, "CHUNK_LINES", lines)
+    path = write(tmp_path, "ranges.csv", HEAD + "1,0,5\n2,0,6\n" + end)
+    np.testing.assert_array_equal(read(path), [[1, 0, 5], [2, 0, 6]])
+    assert len(read(write(tmp_path, "ranges.csv", HEAD + end))) == 0
+
+
+@pytest.mark.parametrize("lines", [1, 2, 1000])
+def test_blank_lines_that_others_follow_are_errors(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lines: int
+) -> None:
+    monkeypatch.setattr(reader, "CHUNK_LINES", lines)
+    path = write(tmp_path, "ranges.csv", HEAD + "1,0,5\n\n\n2,0,6\n")
+    with pytest.raises(LogError) as caught:
+        read(path)
+    assert caught.value.line == 3
+
+
+@pytest.mark.parametrize(
+    ("text", "cause"),
+    [
+        ("time_s;source;range_m\n1;0;5\n", "separator"),
+        ("time_s\tsource\trange_m\n1\t0\t5\n", "separator"),
+        (HEAD + "1,5,0,7,25\n", "decimal_comma"),
+        (HEAD + "1,0\n", "unreadable"),
+        (HEAD + "1,0,nan\n", "unreadable"),
+        (HEAD + "1665936896000,0,5\n", "milliseconds"),
+        (HEAD + "1665936896000000,0,5\n", "microseconds"),
+        (HEAD + "1,0,-1\n", "no_echo"),
+        (HEAD + "1,0,250000\n", "millimetres"),
+    ],
+)
+def test_an_error_names_its_cause(tmp_path: Path, text: str, cause: str) -> None:
+    with pytest.raises(LogError) as caught:
+        read(write(tmp_path, "ranges.csv", text))
+    assert caught.value.cause == cause
 
 
 def test_line_numbers_are_those_of_the_file_in_later_chunks_too(
@@ -335,5 +377,5 @@ def test_importers_refuse_another_table(tmp_path: Path) -> None:
     with pytest.raises(LogError, match="has no column t: is this the set named"):
         IMPORTERS["goats14"](tmp_path, tmp_path / "out")
     (tmp_path / "odometry.csv").write_text("t,dx_body,dy_body,dtheta\n1,2,x,4\n")
-    with pytest.raises(LogError, match="not a table of numbers"):
+    with pytest.raises(LogError, match="line 2: 'x' is not a number"):
         IMPORTERS["goats14"](tmp_path, tmp_path / "out")

@@ -153,13 +153,38 @@ def test_wheel_outside_the_source_tree(wheel, declared_version, tmp_path, run):
     assert all(file.startswith(str(tmp_path)) for file in files)
 
 
-def test_sdist_contents(root, tmp_path, declared_version, run):
-    code = "import scikit_build_core.build as backend, sys; print(backend.build_sdist(sys.argv[1]))"
-    run(sys.executable, "-c", code, tmp_path, cwd=root)
+def test_sdist_has_what_git_tracks(root, tmp_path, declared_version, run):
+    """No more, whatever lies about in the checkout, and no less."""
+    stray = root / "python" / "auvest" / "left [over] by someone.txt"
+    code = "import backend, sys; print(backend.build_sdist(sys.argv[1]))"
+    stray.write_text("not tracked, not ignored")
+    try:
+        environment = {**os.environ, "PYTHONPATH": str(root / "python")}
+        run(sys.executable, "-c", code, tmp_path, cwd=root, env=environment)
+    finally:
+        stray.unlink()
     with tarfile.open(tmp_path / f"auvest-{declared_version}.tar.gz") as archive:
-        names = {name.split("/", 1)[1] for name in archive.getnames()}
-    needed = ["CMakeLists.txt", "pyproject.toml", "README.md", "LICENSE", "cpp", "python", "tests"]
-    for entry in needed:
-        paths = [root / entry] if (root / entry).is_file() else (root / entry).rglob("*.*pp")
-        assert {str(path.relative_to(root)) for path in paths} <= names
-    assert not [name for name in names if name.startswith(("build/", "dist/", ".venv/", ".git/"))]
+        files = [member.name for member in archive.getmembers() if member.isfile()]
+    names = {name.split("/", 1)[1] for name in files}
+    tracked = set(run("git", "ls-files", "-z", cwd=root).split("\0")) - {"", ".ci/run"}
+    assert names - {"PKG-INFO"} == {name for name in tracked if (root / name).exists()}
+
+
+def test_tests_run_with_the_packages_of_the_lock(root):
+    """Every one that is installed here is in it, in its version."""
+    lock = (root / "tests/requirements.lock").read_text()
+    entries = re.split(r"(?m)^(?=[a-z0-9])", lock)[1:]
+    assert len(entries) > 40
+    locked = {}
+    for entry in entries:
+        name, found = re.match(r"([a-z0-9-]+)==([^ ;]+)", entry).groups()
+        assert re.search(r"--hash=sha256:[0-9a-f]{64}", entry), name
+        locked.setdefault(name, set()).add(found)
+    text = (root / "pyproject.toml").read_text()
+    lists = re.findall(r"(?ms)^(?:requires|dependencies|test|dev) = \[(.*?)\]$", text)
+    wanted = [name for part in lists for name in re.findall(r'"([A-Za-z0-9-]+)[>=]', part)]
+    assert {"pybind11", "numpy", "hypothesis", "mypy"} <= set(wanted)
+    for name in wanted:
+        assert name in locked, f"{name}: make lock"
+        if "CI" in os.environ and name != "tomli":  # which newer versions of Python have
+            assert version(name) in locked[name], f"{name}: make install-editable"

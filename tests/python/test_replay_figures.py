@@ -156,6 +156,7 @@ NUMBERS: dict[str, Any] = {
 
 def test_figures_in_words(result: Result) -> None:
     assert dict(report.rows(replace(result, numbers=NUMBERS))) == {
+        "verdict": "sound",
         "time": "1.2 to 20.0 s",
         "measurements": "28",
         "accepted": "1",

@@ -18,7 +18,7 @@ from conftest import ROOT
 from typer.testing import CliRunner
 
 from auvest.commands import reproduce
-from auvest.commands.console import Terminal
+from auvest.commands.console import Terminal, discard_unpublished
 from auvest.commands.session import Session, failure, mean_over_runs
 from auvest.reproduce import markdown
 from auvest.reproduce.claims import NO, PARTLY, YES, Claim, Claims, graded, tally
@@ -36,7 +36,7 @@ def places(text: str) -> set[str]:
 
 def test_there_is_a_template_for_each_command() -> None:
     assert [path.name for path in FOLDERS] == [
-        "aukf", "intervals", "logs", "mekf", "mrclam6", "slatf", "vehicle",
+        "aukf", "intervals", "logs", "mekf", "mistakes", "mrclam6", "slatf", "vehicle",
     ]  # fmt: skip
 
 
@@ -157,7 +157,8 @@ def test_a_session_ends_with_what_happened(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def session() -> Session:
-        return Session(Terminal(as_json=False, quiet=False), tmp_path, "simulate x", {})
+        discard_unpublished()
+        return Session(Terminal(as_json=False, quiet=False), tmp_path / "out", "simulate x", {})
 
     def stopped(partial: Any, **_: Any) -> Any:
         stop = KeyboardInterrupt()
@@ -253,8 +254,8 @@ def test_reproduce_writes_page_and_json_with_the_defaults_of_measure(
 @pytest.mark.parametrize(
     ("result", "code", "says", "files"),
     [
-        (Result(7, failed_runs=2), 1, "2 runs failed", 2),
-        (Result(7, unfinished="2 of 3 points"), 130, "2 of 3 points are written", 2),
+        (Result(7, failed_runs=2), 1, "2 runs failed", 3),
+        (Result(7, unfinished="2 of 3 points"), 130, "2 of 3 points are written", 3),
         (KeyboardInterrupt(), 130, "0 files are written", 0),
         (ValueError("runs is odd"), 2, "runs is odd", 0),
     ],

@@ -174,6 +174,7 @@ def test_command(tmp_path, monkeypatch):
     document = json.loads(result.stdout)
     assert [c["track"] for c in document["cases"]] == ["near, turning", "far, turning"]
     assert sorted(p.name for p in tmp_path.iterdir()) == [
+        ".auvest.json",
         "README.md",
         "intervals.png",
         "results.json",

@@ -265,6 +265,7 @@ def test_simulate_prints_a_table_and_writes_files(tmp_path: Path) -> None:
     for word in ("SLATF 2.0", "position RMSE / m", "resamplings per run", "failed runs"):
         assert word in text
     assert {path.name for path in tmp_path.iterdir()} == {
+        ".auvest.json",
         "figure.png",
         "per_ping.csv",
         "results.json",
@@ -368,7 +369,7 @@ def test_ctrl_c_keeps_runs_and_the_same_command_goes_on(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "auvest", "simulate", "slatf", *options]
     command += ["--output", str(tmp_path / "out")]
     with start_program(command) as program:
-        runs = tmp_path / "out" / ".runs"
+        runs = tmp_path / "out.runs"
         wait_until(lambda: len(list(runs.glob("*.npz"))) >= 3, "three chunks are kept", program)
         program.send_signal(signal.SIGINT)
         out, err = program.communicate(timeout=PATIENCE_S)
@@ -389,7 +390,7 @@ def test_ctrl_c_keeps_runs_and_the_same_command_goes_on(tmp_path: Path) -> None:
     assert fresh.exit_code == again.exit_code == 0
     tables = [(tmp_path / name / "runs.csv").read_bytes() for name in ("fresh", "out")]
     assert tables[0] == tables[1]
-    assert not (tmp_path / "out" / ".runs").exists()
+    assert not (tmp_path / "out.runs").exists()
 
 
 def test_identity_leaves_out_what_does_not_change_a_run() -> None:

@@ -90,6 +90,6 @@ def test_the_command_makes_page_and_pictures(tmp_path):
     document = json.loads(done.stdout)
     assert all(check["ok"] for check in document["checks"])
     assert {path.name for path in tmp_path.iterdir()} == {
-        "README.md", "results.json", "closed_loop.png", "tracks.png",
+        ".auvest.json", "README.md", "results.json", "closed_loop.png", "tracks.png",
     }  # fmt: skip
     assert document["closed_loop"][0]["runs"] == 2

@@ -2,8 +2,8 @@
 
 The sketch runs on an Arduino at --port, or on a simulated one with --simulator, where the vehicle
 and its sonar are simulated too. --play-sonar simulates them for a board that has no sonar.
-Every sample is in the CSV file as soon as it has come, with all the bits of its floats; Ctrl-C
-ends a recording and keeps it.
+Every sample is in the CSV file as soon as it has come, with all the bits of its floats, until the
+end in a folder whose name ends in .unfinished; Ctrl-C ends a recording and keeps it.
 
 Examples
 --------
@@ -239,6 +239,7 @@ def command(
     ] = 0.0,
     seed: options.Seed = 1,
     output: options.Output = Path("auvest-output/capture"),
+    force: options.Force = False,
     no_figure: options.NoFigure = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
@@ -266,15 +267,16 @@ def command(
     }
     if played:
         settings.update(noise=asdict(errors), seed=seed)
-    session = Session(terminal, output, "capture", settings)
+    recorded = port is not None  # not simulated: it cannot be made again
     path = output / "record.csv"
-    if port is not None and path.exists():
+    if recorded and path.exists() and not force:
         terminal.fail(
             f"{path} exists and will not be overwritten: choose another --output", ExitCode.USAGE
         )
+    session = Session(terminal, output, "capture", settings, force=force, precious=recorded)
 
     with terminal.writing(output):
-        recording = Recording(path, sonar)
+        recording = Recording(session.part / path.name, sonar)
         with terminal.progress("samples") as progress:
 
             def wanted() -> bool:
@@ -295,14 +297,14 @@ def command(
             finally:
                 recording.close()
     if not recording.rows:
-        path.unlink(missing_ok=True)
+        recording.path.unlink(missing_ok=True)
         why = session.trouble or recording.last_damage or "interrupted"
         code = ExitCode.INTERRUPTED if session.interrupted else ExitCode.FAILED
         terminal.fail(f"no sample has come: {why}", code)
 
     values = measures(recording, simulated=simulator is not None)
     source = settings["source"]
-    session.files["record"] = path
+    session.add("record", path)
     if not no_figure:
         session.draw(_figure, recording, sensor, source)
     session.report(values, _table(values, source))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,11 +19,25 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
+from rich.text import Text
 
+from auvest._outputs import NewFolder, OutputError
 from auvest.commands.exit_codes import ExitCode
 
 #: ``progress(done, total)``, called now and then by long work.
 ProgressCallback = Callable[[int, int], None]
+
+#: Folders of results that are being made.
+_being_made: list[NewFolder] = []
+
+
+def discard_unpublished() -> None:
+    """Remove what a command has begun to write and not finished; the results before it stay."""
+    while _being_made:
+        new = _being_made.pop()
+        new.discard()
+        if new.left is not None:
+            typer.echo(f"Note: what was recorded is in {shown(new.left)}", err=True)
 
 
 class Terminal:
@@ -30,14 +45,17 @@ class Terminal:
 
     def __init__(self, *, as_json: bool, quiet: bool) -> None:
         self.as_json = as_json
+        for stream in (sys.stdout, sys.stderr):  # a name may hold what the console cannot show
+            if hasattr(stream, "reconfigure"):
+                stream.reconfigure(errors="backslashreplace")
         self._out = Console(highlight=False, soft_wrap=True)
         self._err = Console(stderr=True, highlight=False, soft_wrap=True)
         self._messages = Console(stderr=True, highlight=False, soft_wrap=True, quiet=quiet)
 
     def result(self, renderable: Any) -> None:
-        """Print a result for a human; with ``--json`` nothing."""
+        """Print a result for a human, text as it is; with ``--json`` nothing."""
         if not self.as_json:
-            self._out.print(renderable)
+            self._out.print(Text(renderable) if isinstance(renderable, str) else renderable)
 
     def result_json(self, value: dict[str, Any]) -> None:
         """Print the one JSON object, if it was asked for."""
@@ -47,15 +65,15 @@ class Terminal:
     def files(self, files: Mapping[str, Path]) -> None:
         """Print for a human what was written."""
         for name, path in files.items():
-            self.result(f"{name.replace('_', ' '):9} {path}")
+            self.result(f"{name.replace('_', ' '):9} {shown(path)}")
 
     def warn(self, message: str) -> None:
         """Print one line on stderr, unless quiet."""
-        self._messages.print(f"[bold yellow]Note:[/] {escape(message)}")
+        self._messages.print(f"[bold yellow]Note:[/] {escape(shown(message, lines=True))}")
 
     def fail(self, message: str, code: ExitCode) -> NoReturn:
         """Print one line on stderr and end."""
-        self._err.print(f"[bold red]Error:[/] {escape(message)}")
+        self._err.print(f"[bold red]Error:[/] {escape(shown(message, lines=True))}")
         raise typer.Exit(int(code))
 
     @contextmanager
@@ -80,18 +98,35 @@ class Terminal:
         except (ValueError, TypeError) as error:
             self.fail(str(error), ExitCode.USAGE)
 
-    def make_folder(self, folder: Path) -> None:
-        """Create the output folder before the work, so that a wrong one is known at once."""
+    def new_folder(
+        self, folder: Path, command: str, *, force: bool = False, precious: bool = False
+    ) -> NewFolder:
+        """Begin a folder of results before the work, so that a wrong one is known at once.
+
+        Parameters are those of :class:`auvest._outputs.NewFolder`; unless it is published, nothing
+        of it is left when the command ends.
+        """
         try:
-            folder.mkdir(parents=True, exist_ok=True)
-            probe = folder / ".auvest-write-test"
-            probe.touch()
-            probe.unlink()
+            new = NewFolder(folder, command, force=force, precious=precious)
+        except OutputError as error:
+            self.fail(f"--output: {error}", ExitCode.USAGE)
         except OSError as error:
             self.fail(
                 f"--output {folder}: cannot write there: {error.strerror or error}",
                 ExitCode.FAILED,
             )
+        _being_made.append(new)
+        return new
+
+    def publish(self, new: NewFolder, *, interrupted: bool = False) -> None:
+        """Give a folder of results its name, and say where a folder that was there went."""
+        with self.writing(new.path):
+            try:
+                new.publish(interrupted=interrupted)
+            except OutputError as error:
+                self.fail(f"--output: {error}; the results are in {new.part}", ExitCode.FAILED)
+        if new.kept is not None:
+            self.warn(f"what was in {new.path} is now in {new.kept}")
 
     @contextmanager
     def writing(self, folder: Path) -> Iterator[None]:
@@ -102,15 +137,28 @@ class Terminal:
             self.fail(f"cannot write to {folder}: {error.strerror or error}", ExitCode.FAILED)
 
 
+def shown(text: object, *, lines: bool = False) -> str:
+    """Give a name as it can be shown: what cannot be printed is written as in Python.
+
+    ``lines``: it is a message, whose line breaks are wanted.
+    """
+    return "".join(
+        letter
+        if letter.isprintable() or (lines and letter == "\n")
+        else letter.encode("unicode_escape", "surrogatepass").decode("ascii")
+        for letter in str(text)
+    )
+
+
 def table(
     title: str, header: Sequence[str], rows: Iterable[Sequence[str]], right: Container[int] = ()
 ) -> Table:
     """Make a table; ``right`` are the columns that are flush right."""
-    made = Table(title=title, title_justify="left", title_style="bold")
+    made = Table(title=Text(shown(title)), title_justify="left", title_style="bold")
     for number, name in enumerate(header):
         made.add_column(name, justify="right" if number in right else "left")
     for row in rows:
-        made.add_row(*row)
+        made.add_row(*map(Text, row))
     return made
 
 

@@ -97,22 +97,21 @@ def command(
             file_okay=False,
         ),
     ] = None,
+    force: options.Force = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
     """Measure; the help text is the module's."""
     terminal = Terminal(as_json=as_json, quiet=quiet)
     with ExitStack() as stack:
-        if output is None:
-            output = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        else:
-            terminal.make_folder(output)
+        new = terminal.new_folder(output, "cost", force=force) if output is not None else None
+        folder = new.part if new else Path(stack.enter_context(tempfile.TemporaryDirectory()))
         stack.enter_context(terminal.usage_errors())
         progress = stack.enter_context(terminal.progress("Compiling and running"))
         try:
             cost = measure(
                 header,
-                output=output,
+                output=folder,
                 filter=filter_name,
                 process=process,
                 sensors=sensor or (),
@@ -128,6 +127,8 @@ def command(
             )
         except (BoardError, FileNotFoundError, PackageError, SimulatorError, SketchError) as error:
             terminal.fail(str(error), ExitCode.FAILED)
+    if new is not None:
+        terminal.publish(new)
     terminal.result_json({"command": "cost", "version": version(), **cost.row()})
     terminal.result(_table(cost))
     if cost.difference is None:

@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy.typing as npt
 
+from auvest._outputs import new_file
 from auvest.commands import console
 
 
 def write_csv(path: Path, columns: Mapping[str, npt.NDArray[Any]]) -> Path:
     """Write columns of one length under their names, six significant digits, NaN as nothing."""
-    with path.open("w", encoding="utf-8", newline="") as file:
+    with new_file(path, "w", encoding="utf-8", newline="") as file:
         file.write(",".join(columns) + "\n")
         for row in zip(*columns.values(), strict=True):
             file.write(",".join(_cell(value) for value in row) + "\n")
@@ -24,11 +25,9 @@ def _cell(value: Any) -> str:
     return "" if value != value else f"{value:.6g}"
 
 
-def write_results(folder: Path, document: dict[str, Any], files: dict[str, Path]) -> None:
-    """Write results.json; ``files`` gets its path, and ``document`` the paths of all files."""
-    files["results"] = folder / "results.json"
-    document["files"] = {name: str(path) for name, path in files.items()}
-    _write(files["results"], console.to_json(document) + "\n")
+def write_results(folder: Path, document: Mapping[str, Any]) -> Path:
+    """Write results.json."""
+    return write_text(folder / "results.json", console.to_json(document) + "\n")
 
 
 def write_page(
@@ -39,14 +38,16 @@ def write_page(
     done: list[Path],
 ) -> None:
     """Write results.json, the CSV files and the page; ``done`` gets each path when it is there."""
-    done.append(_write(folder / "results.json", console.to_json(document) + "\n"))
+    done.append(write_results(folder, document))
     for stem, table in tables.items():
         done.append(write_csv(folder / f"{stem}.csv", table))
-    done.append(_write(folder / "README.md", page))
+    done.append(write_text(folder / "README.md", page))
 
 
-def _write(path: Path, text: str) -> Path:
-    path.write_text(text, encoding="utf-8")
+def write_text(path: Path, text: str) -> Path:
+    """Write a text; what of a name is no text is written as Python writes it."""
+    with new_file(path, "w", encoding="utf-8", errors="backslashreplace") as file:
+        file.write(text)
     return path
 
 
@@ -60,6 +61,7 @@ def save_figures(
     """Draw each figure of a result and write it as PNG under its name."""
     from auvest import plots  # here, because matplotlib takes long to import
 
-    for number, (stem, draw) in enumerate(figures.items(), start=1):
-        done.append(plots.save(draw(result), folder / f"{stem}.png"))
-        progress(number, len(figures))
+    with plots.own_style():
+        for number, (stem, draw) in enumerate(figures.items(), start=1):
+            done.append(plots.save(draw(result), folder / f"{stem}.png"))
+            progress(number, len(figures))

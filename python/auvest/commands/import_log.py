@@ -19,7 +19,7 @@ from typing import Annotated, Literal
 import typer
 
 from auvest.commands import options
-from auvest.commands.console import Terminal
+from auvest.commands.console import Terminal, shown
 from auvest.commands.version import version
 from auvest.logs.importers import IMPORTERS
 
@@ -35,16 +35,16 @@ def command(
             metavar="OUT", help="Folder for the logs; made if missing.", show_default=False
         ),
     ],
+    force: options.Force = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
     """Import; the help text is the module's."""
     terminal = Terminal(as_json=as_json, quiet=quiet)
-    terminal.make_folder(output)
     with terminal.usage_errors(), terminal.writing(output):
-        folders = IMPORTERS[name](source, output)
+        folders = IMPORTERS[name](source, output, force=force)
     terminal.result_json(
         {"command": "import", "version": version(), "logs": [str(folder) for folder in folders]}
     )
     for folder in folders:
-        terminal.result(f"log       {folder}")
+        terminal.result(f"log       {shown(folder)}")

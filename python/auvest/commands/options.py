@@ -84,7 +84,13 @@ Workers = Annotated[
 Json = Annotated[bool, option(_OUTPUT, "One JSON object on stdout, nothing else.", "--json")]
 Quiet = Annotated[bool, option(_OUTPUT, "Only errors on stderr.", "--quiet", "-q")]
 Output = Annotated[
-    Path, option(_OUTPUT, "Folder for the results; made if missing.", "--output", file_okay=False)
+    Path,
+    option(
+        _OUTPUT,
+        "Folder for the results, which replace those of the same command before.",
+        "--output",
+        file_okay=False,
+    ),
 ]
 #: Recordings are not part of the package.
 Data = Annotated[
@@ -95,6 +101,14 @@ Data = Annotated[
         file_okay=False,
         help="Folder of the recordings.",
         show_default=False,
+    ),
+]
+Force = Annotated[
+    bool,
+    option(
+        _OUTPUT,
+        "Replace the results of another command in --output; set aside what is not auvest's.",
+        "--force",
     ),
 ]
 NoFigure = Annotated[bool, option(_OUTPUT, "Draw nothing.", "--no-figure")]
@@ -150,3 +164,22 @@ FixDropout = Annotated[
 CompassBias = Annotated[
     float, option(WORLD, "Its standard deviation, degrees.", "--compass-bias", check=not_negative)
 ]
+
+
+def sea(
+    current: float,
+    direction: float | None,
+    compass_bias: float,
+    outliers: float,
+    latency: float,
+    dropout: float,
+) -> dict[str, float]:
+    """Give the values of these options as a mission takes them: angles in radians."""
+    return {
+        "current_m_s": current,
+        "current_rad": math.nan if direction is None else math.radians(direction),
+        "compass_bias_rad": math.radians(compass_bias),
+        "usbl_outliers": outliers,
+        "usbl_latency_s": latency,
+        "usbl_dropout": dropout,
+    }

@@ -4,6 +4,9 @@ A LOG is a folder of CSV files, as docs/logs.md describes it and 'auvest import'
 the output folder gets a folder with the estimates, measurements and errors as CSV and Parquet, the
 track as TUM text, a figure, one self-contained HTML report and results.json.
 
+The log is checked on the way as 'auvest check' does it, and the result has a verdict: sound,
+doubtful or not to be trusted, with the reason; no truth is looked at for it.
+
 Examples
 --------
   auvest import goats14 data/goats14 logs
@@ -19,10 +22,12 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.markup import escape
 
-from auvest.commands import console, options
-from auvest.commands.console import Terminal, table
+from auvest.commands import options
+from auvest.commands.console import Terminal, shown, table
 from auvest.commands.exit_codes import ExitCode
+from auvest.commands.files import write_results, write_text
 from auvest.commands.version import version
 from auvest.errors import FilterError
 from auvest.logs import LogFolder
@@ -52,6 +57,7 @@ def command(
         ),
     ] = None,
     output: options.Output = Path("auvest-output/replay"),
+    force: options.Force = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -64,25 +70,24 @@ def command(
         for name in names:
             if names.count(name) > 1:
                 raise ValueError(f"LOG: two logs have the name {name}, and so would their results")
-    terminal.make_folder(output)
+    targets = [terminal.new_folder(output / name, "replay", force=force) for name in names]
     results: list[Result] = []
-    for folder, name in zip(folders, names, strict=True):
-        target = output / name
-        terminal.make_folder(target)
+    for folder, name, target in zip(folders, names, targets, strict=True):
         with (
-            terminal.progress(f"{name}, bytes") as progress,
+            terminal.progress(f"{escape(shown(name))}, bytes") as progress,
             terminal.usage_errors(),
-            terminal.writing(target),
+            terminal.writing(target.path),
         ):
             try:
                 result = run_replay(
-                    folder, settings, filter_name=filter_name, folder=target, progress=progress
+                    folder, settings, filter_name=filter_name, folder=target.part, progress=progress
                 )
             except FilterError as error:
                 terminal.fail(f"{name}: {error}", ExitCode.FAILED)
         results.append(result)
-        with terminal.writing(target):
-            write_results(target, result)
+        with terminal.writing(target.path):
+            _write(target.part, result)
+        terminal.publish(target, interrupted=result.interrupted)
         if result.interrupted:
             break
     interrupted = results[-1].interrupted
@@ -101,16 +106,15 @@ def command(
         )
 
 
-def write_results(folder: Path, result: Result) -> None:
+def _write(folder: Path, result: Result) -> None:
     """Write results.json, the figure and the report."""
     from auvest import plots  # here, because matplotlib takes long to import
     from auvest.replay import figures, report
 
-    (folder / "results.json").write_text(
-        console.to_json(result.document()) + "\n", encoding="utf-8"
-    )
-    plots.save(figures.overview(result), folder / "figure.png")
-    (folder / "report.html").write_text(report.html(result), encoding="utf-8")
+    write_results(folder, result.document())
+    with plots.own_style():
+        plots.save(figures.overview(result), folder / "figure.png")
+        write_text(folder / "report.html", report.html(result))
 
 
 def _show(terminal: Terminal, result: Result, folder: Path) -> None:
@@ -118,8 +122,10 @@ def _show(terminal: Terminal, result: Result, folder: Path) -> None:
 
     title = f"{result.name}, {result.filter_name}"
     terminal.result(table(title, ("quantity", "value"), report.rows(result), right={1}))
-    terminal.result(f"report    {folder / 'report.html'}")
-    terminal.result(f"tables    {folder}: estimates, measurements, errors as .csv and .parquet")
-    terminal.result(f"track     {folder / 'trajectory.tum'}\n")
+    terminal.result(f"report    {shown(folder / 'report.html')}")
+    terminal.result(
+        f"tables    {shown(folder)}: estimates, measurements, errors as .csv and .parquet"
+    )
+    terminal.result(f"track     {shown(folder / 'trajectory.tum')}\n")
     for warning in report.warnings(result):
         terminal.warn(f"{result.name}: {warning}")

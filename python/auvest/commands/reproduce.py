@@ -14,7 +14,7 @@ from typing import Any
 
 from rich.table import Table
 
-from auvest.commands import options
+from auvest.commands import console, options
 from auvest.commands.console import Terminal
 from auvest.commands.exit_codes import ExitCode
 from auvest.commands.files import save_figures, write_page
@@ -55,12 +55,12 @@ def command(
     package = page.__name__.rpartition(".")[0]
     name = package.rpartition(".")[2].replace("_", "-")
 
-    def run(*, output: Path, as_json: bool, quiet: bool, **given: Any) -> None:
+    def run(*, output: Path, force: bool, as_json: bool, quiet: bool, **given: Any) -> None:
         terminal = Terminal(as_json=as_json, quiet=quiet)
         if hasattr(measure, "check"):
             with terminal.usage_errors():
                 measure.check(**given)
-        terminal.make_folder(output)
+        folder = terminal.new_folder(output, f"reproduce {name}", force=force)
         done: list[Path] = []
         try:
             with terminal.progress("experiments") as progress, terminal.usage_errors():
@@ -74,28 +74,32 @@ def command(
                 document["claims"] = [claim.as_dict() for claim in claims.claims(result)]
             tables = measure.tables(result) if hasattr(measure, "tables") else {}
             with terminal.writing(output):
-                write_page(output, document, tables, page.page(result), done)
+                write_page(folder.part, document, tables, page.page(result), done)
             if figures:
                 drawn = import_module(f"{package}.figures").FIGURES
                 with terminal.progress("figures") as progress, terminal.writing(output):
-                    save_figures(output, drawn, result, progress, done)
+                    save_figures(folder.part, drawn, result, progress, done)
         except KeyboardInterrupt:
+            if done:
+                terminal.publish(folder, interrupted=True)
             terminal.fail(
                 f"interrupted: {len(done)} files are written to {output}", ExitCode.INTERRUPTED
             )
         unfinished = getattr(result, "unfinished", "")
+        terminal.publish(folder, interrupted=bool(unfinished))
         if unfinished:
             terminal.fail(
-                f"interrupted: {unfinished} are written to {output}", ExitCode.INTERRUPTED
+                f"interrupted: {unfinished} are written to {console.shown(output)}",
+                ExitCode.INTERRUPTED,
             )
         terminal.result_json(document)
         for table in shown(result):
             terminal.result(table)
-        terminal.result(f"page      {output / 'README.md'}")
+        terminal.result(f"page      {console.shown(output / 'README.md')}")
         if figures:
             pictures = ", ".join(path.name for path in done if path.suffix == ".png")
-            terminal.result(f"figures   {output / pictures}")
-        terminal.result(f"results   {output / 'results.json'}")
+            terminal.result(f"figures   {console.shown(output / pictures)}")
+        terminal.result(f"results   {console.shown(output / 'results.json')}")
         failed = getattr(result, "failed_runs", 0)
         if failed:
             terminal.fail(f"{failed} runs failed; numbers are missing", ExitCode.FAILED)
@@ -113,6 +117,7 @@ def with_options(
     known = signature(defaults).parameters
     wanted = {name: (option, known[name].default) for name, option in annotations.items()}
     wanted["output"] = (options.Output, folder)
+    wanted["force"] = (options.Force, False)
     wanted.update(as_json=(options.Json, False), quiet=(options.Quiet, False))
     function.__annotations__ = {name: option for name, (option, _) in wanted.items()}
     function.__signature__ = Signature(  # type: ignore[attr-defined]

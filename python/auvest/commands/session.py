@@ -31,24 +31,36 @@ class Session:
     terminal : Terminal
         Where to write.
     output : Path
-        The folder for the results; it is made.
+        The folder for the results, made as :class:`auvest._outputs.NewFolder` says.
     command : str
         The words after ``auvest``.
     settings : dict
         What the results depend on, for results.json.
+    force, precious : bool
+        As for :class:`auvest._outputs.NewFolder`.
 
     Attributes
+    ----------
+    part : Path
+        Where to write files of one's own.
     ----------
     interrupted : bool
         Ctrl-C came before all was done.
     trouble : str
         What else ended it before all was done.
     files : dict of str to Path
-        What was written, by its name on the terminal.
+        What was written, by its name on the terminal: where it is at the end.
     """
 
     def __init__(
-        self, terminal: Terminal, output: Path, command: str, settings: dict[str, Any]
+        self,
+        terminal: Terminal,
+        output: Path,
+        command: str,
+        settings: dict[str, Any],
+        *,
+        force: bool = False,
+        precious: bool = False,
     ) -> None:
         self.interrupted = False
         self.trouble = ""
@@ -56,7 +68,8 @@ class Session:
         self._terminal = terminal
         self._output = output
         self._head = {"command": command, "version": version(), "settings": settings}
-        terminal.make_folder(output)
+        self._folder = terminal.new_folder(output, command, force=force, precious=precious)
+        self.part = self._folder.part
 
     def run(self, simulate: Callable[..., R], *arguments: Any, **options: Any) -> R:
         """Do the runs; after Ctrl-C return those that are done, end if there are none."""
@@ -81,22 +94,28 @@ class Session:
     def write_csv(self, name: str, columns: Mapping[str, npt.NDArray[Any]]) -> None:
         """Write a table of the results."""
         with self._terminal.writing(self._output):
-            self.files[name] = write_csv(self._output / f"{name}.csv", columns)
+            self.add(name, write_csv(self.part / f"{name}.csv", columns))
+
+    def add(self, name: str, path: Path) -> None:
+        """Name a file that was written."""
+        self.files[name] = self._output / path.name
 
     def draw(self, figure: Callable[..., Figure], *arguments: Any) -> None:
         """Draw the figure of the results."""
         from auvest import plots  # here, because matplotlib takes long to import
 
-        with self._terminal.writing(self._output):
-            path = self._output / "figure.png"
-            self.files["figure"] = plots.save(figure(*arguments), path)
+        with self._terminal.writing(self._output), plots.own_style():
+            self.add("figure", plots.save(figure(*arguments), self.part / "figure.png"))
 
     def report(self, results: dict[str, Any], table: Table, **more: Any) -> None:
-        """Write results.json beside the files that are there, and print what was asked for."""
+        """Write results.json, give the folder its name, and print what was asked for."""
         complete = not (self.interrupted or self.trouble)
         document = {**self._head, "complete": complete, "results": results, **more}
+        self.files["results"] = self._output / "results.json"
+        document["files"] = {name: str(path) for name, path in self.files.items()}
         with self._terminal.writing(self._output):
-            write_results(self._output, document, self.files)
+            write_results(self.part, document)
+        self._terminal.publish(self._folder, interrupted=not complete)
         self._terminal.result_json(document)
         self._terminal.result(table)
         self._terminal.files(self.files)

@@ -142,6 +142,7 @@ def command(
     seed: options.Seed = 1,
     workers: options.Workers = None,
     output: options.Output = Path("auvest-output/simulate-aukf"),
+    force: options.Force = False,
     no_figure: options.NoFigure = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
@@ -191,7 +192,7 @@ def command(
         "runs": runs,
         "seed": seed,
     }
-    session = Session(terminal, output, "simulate aukf", settings)
+    session = Session(terminal, output, "simulate aukf", settings, force=force)
     result = session.run(simulate, filter_, scenario, workers=workers)
     values = measures(result)
     per_step = means_per_step(result)

@@ -101,6 +101,7 @@ def command(
     seed: options.Seed = 1,
     workers: options.Workers = None,
     output: options.Output = Path("auvest-output/simulate-mekf"),
+    force: options.Force = False,
     no_figure: options.NoFigure = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
@@ -136,7 +137,7 @@ def command(
         "dtype": dtype,
         "scenario": asdict(scenario),
     }
-    session = Session(terminal, output, "simulate mekf", settings)
+    session = Session(terminal, output, "simulate mekf", settings, force=force)
     results: dict[str, Result] = {}
     for name, filter_ in (("plain", plain), ("robust", robust)):
         result = session.run_some(

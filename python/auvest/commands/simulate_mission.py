@@ -96,6 +96,7 @@ def command(
     seed: options.Seed = 1,
     workers: options.Workers = None,
     output: options.Output = Path("auvest-output/simulate-mission"),
+    force: options.Force = False,
     no_figure: options.NoFigure = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
@@ -121,17 +122,12 @@ def command(
             degrees_of_freedom=degrees_of_freedom,
             dtype=dtype,
             speed_m_s=speed,
-            current_m_s=current,
-            current_rad=math.nan if current_direction is None else math.radians(current_direction),
-            compass_bias_rad=math.radians(compass_bias),
-            usbl_outliers=outliers,
-            usbl_latency_s=latency,
-            usbl_dropout=dropout,
+            **options.sea(current, current_direction, compass_bias, outliers, latency, dropout),
             arc_m=arc,
             runs=runs,
             seed=seed,
         )
-    session = Session(terminal, output, "simulate mission", mission.settings(plan))
+    session = Session(terminal, output, "simulate mission", mission.settings(plan), force=force)
     result = session.run(mission.simulate, plan, workers=workers)
     values = measures(result)
     session.write_csv("per_step", means_per_step(result))

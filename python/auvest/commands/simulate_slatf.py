@@ -120,6 +120,7 @@ def command(
     table: Annotated[
         Literal["csv", "parquet"], option("Output", "Format of the table of runs.")
     ] = "csv",
+    force: options.Force = False,
     no_figure: options.NoFigure = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
@@ -173,8 +174,8 @@ def command(
         "dtype": dtype,
         "scenario": asdict(scenario),
     }
-    session = Session(terminal, output, "simulate slatf", settings)
-    store = output / ".runs"
+    session = Session(terminal, output, "simulate slatf", settings, force=force)
+    store = output.with_name(f"{output.name}.runs")
     identity = _identity(settings)
     with terminal.writing(output):
         result = session.run(
@@ -184,8 +185,7 @@ def command(
     per_ping = means_per_ping(result)
     session.write_csv("per_ping", per_ping)
     with terminal.writing(output):
-        path = output / f"runs.{table}"
-        session.files["runs"] = montecarlo.write_table(path, per_run(result))
+        session.add("runs", montecarlo.write_table(session.part / f"runs.{table}", per_run(result)))
     if not no_figure:
         session.draw(_figure, result, title)
     session.report(values, _table(values, scenario, title), per_ping=per_ping)

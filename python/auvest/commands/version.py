@@ -1,4 +1,11 @@
-"""The version of the installed package: it lives in pyproject.toml only."""
+"""``auvest version``: the version of the installed package, and what this build lacks.
+
+It is what ``auvest --version`` shows. The version lives in pyproject.toml only.
+
+Examples
+--------
+  auvest version
+"""
 
 from __future__ import annotations
 
@@ -11,3 +18,15 @@ def version() -> str:
         return metadata.version("auvest")
     except metadata.PackageNotFoundError:
         return "unknown (not installed)"
+
+
+def lines() -> list[str]:
+    """Give the name with the version and, of a build that lacks something, a line that says it."""
+    from auvest._build import lacks
+
+    return [f"auvest {version()}", *lacks()]
+
+
+def command() -> None:
+    """Show the version."""
+    print("\n".join(lines()))

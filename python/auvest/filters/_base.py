@@ -7,7 +7,8 @@ understand comes back here, to be converted or refused in words.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, NoReturn, TypeAlias
 
 import numpy as np
@@ -17,6 +18,7 @@ from auvest import _core
 from auvest._arguments import (
     DType,
     Floats,
+    InUse,
     as_array,
     as_covariance,
     as_dtype,
@@ -28,17 +30,19 @@ from auvest._arguments import (
     as_real,
     as_step,
     as_steps,
+    far_from_origin,
     require_range,
 )
 from auvest._core import Decision, Status
-from auvest._state import describe, pack, unpack
-from auvest.errors import FilterError
+from auvest._interrupts import first_slice, in_slices
+from auvest._state import describe, pack, require, unpack
+from auvest.errors import FilterError, Interrupted
 from auvest.filters.results import Report, RunResult
 from auvest.intervals import FixedInterval, IntervalPolicy, MahalanobisInterval, core_interval
 from auvest.kernels import Kernel, KernelName, RejectionStreak, Unit, as_kernel, core_kernel
 from auvest.models import MeasurementModel, ProcessModel, from_description
 from auvest.models._base import UNSAVED
-from auvest.models.functions import FunctionProcess, require_none_raised
+from auvest.models.functions import FunctionProcess, FunctionSensor, require_none_raised
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -51,7 +55,11 @@ Sensors: TypeAlias = MeasurementModel | Sequence[MeasurementModel] | Mapping[str
 _UPDATE = _core.robust_update_defaults()
 _FIXED = FixedInterval()
 _UNIT = Unit()
+_POSITION = ("x_m", "y_m", "z_m")
 _REPORT = ("innovation", "S", "standardised", "weight")
+_LARGEST_REPORT = 6  # numbers of a measurement
+_STATUSES = {int(status) for status in Status.__members__.values()}
+_DECISIONS = {int(decision) for decision in Decision.__members__.values()}
 
 
 class GaussianFilter:
@@ -65,6 +73,8 @@ class GaussianFilter:
     _linearisation: ClassVar[int]
     #: Whether it asks models for their Jacobians.
     _jacobians: ClassVar[bool] = False
+    #: Of the thread that is in :meth:`run`.
+    _run: object
 
     def __init__(
         self,
@@ -77,6 +87,7 @@ class GaussianFilter:
         recovery: RejectionStreak | None = None,
         policy: IntervalPolicy | None = None,
         late_s: float = 0.0,
+        longest_step_s: float = 3600.0,
         residual: Residual = "innovation",
         max_iterations: int = _UPDATE["max_iterations"],
         tolerance: float = _UPDATE["tolerance"],
@@ -103,6 +114,9 @@ class GaussianFilter:
         self._policy = policy
         self._options: dict[str, Any] = {
             "late_s": as_number("late_s", late_s, "not negative"),
+            "longest_step_s": as_number(
+                "longest_step_s", longest_step_s, "positive", infinite=True
+            ),
             "residual": as_kind("residual", residual, ("innovation", "post-fit")),
             "max_iterations": as_integer("max_iterations", max_iterations, 2, 255),
             "tolerance": as_number("tolerance", tolerance, "not negative"),
@@ -114,10 +128,13 @@ class GaussianFilter:
         start = state[[0, min(1, states - 1)]]
         if reference is not None:
             start = as_array("reference", reference, (2,), self._dtype)
+        self._require_local(state, covariance)
         self._build()
         try:
             self._filter.reset(state, covariance, start)
         except _core.StatusError as error:
+            if error.status == Status.far_from_origin:
+                raise ValueError(far_from_origin("x0", state[:2], self._dtype)) from None
             if error.status != Status.not_positive_definite:
                 raise ValueError(f"x0 and P0 are refused: {error}") from None
             smallest = np.linalg.eigvalsh(covariance.astype(np.float64))[0]
@@ -125,6 +142,24 @@ class GaussianFilter:
                 f"P0 must be positive definite in {self._dtype.name}, "
                 f"but its smallest eigenvalue is {smallest:.3g}"
             ) from None
+
+    def _require_local(self, state: Floats, covariance: Floats) -> None:
+        """Refuse a start where motion is rounded away, however little is known of the position.
+
+        What counts is how far the process lets the position go in a second. (Functions of Python
+        are not asked: they are in float64, and may raise.)
+        """
+        if isinstance(self._process, FunctionProcess) or self._process.lacks:
+            return
+        before = np.asarray(covariance, np.float64)
+        phi = self._process.Phi(1.0, state)
+        growth = np.diagonal(phi @ before @ phi.T + self._process.Q(1.0) - before)
+        is_coarse = getattr(_core, f"is_coarse_{self._dtype.name}")
+        largest = float(np.finfo(self._dtype).max)
+        place = [i for i, name in enumerate(self._process.state) if name in _POSITION]
+        for i in place:
+            if growth[i] > 0 and is_coarse(float(state[i]), min(float(growth[i]), largest)):
+                raise ValueError(far_from_origin("x0", state[place], self._dtype))
 
     def _build(self) -> None:
         self._filter = self._core_filter(self._policy)
@@ -138,6 +173,8 @@ class GaussianFilter:
         """Make a filter of the core like this one, with the policy given."""
         name = self._dtype.name
         numbers = {**self._parameters, "late_s": self._options["late_s"]}
+        if self.longest_step_s < np.inf:
+            numbers["longest_step_s"] = self.longest_step_s
         require_range(numbers, name)
         options = {
             "linearisation": self._linearisation,
@@ -147,6 +184,7 @@ class GaussianFilter:
             "max_iterations": self._options["max_iterations"],
             "tolerance": self._options["tolerance"],
             "late_s": self._options["late_s"],
+            "longest_step_s": self._options["longest_step_s"],
         }
         try:
             return getattr(_core, f"Filter_{name}")(
@@ -204,7 +242,11 @@ class GaussianFilter:
 
     @property
     def status(self) -> Status:
-        """What the core reported last: ``Status.ok`` unless a FilterError was raised."""
+        """What the core reported last: ``Status.ok`` unless a FilterError was raised.
+
+        ``Status.recoveries_repeat`` while the recovery has widened the covariance so often that it
+        does not any more: then a model is wrong, and not the estimate.
+        """
         return self._filter.status
 
     @property
@@ -241,6 +283,11 @@ class GaussianFilter:
     def late_s(self) -> float:
         """How long ago a measurement may have been taken, s."""
         return float(self._options["late_s"])
+
+    @property
+    def longest_step_s(self) -> float:
+        """A longer prediction is refused, s; infinity: none is."""
+        return float(self._options["longest_step_s"])
 
     @property
     def policy(self) -> IntervalPolicy | None:
@@ -294,7 +341,7 @@ class GaussianFilter:
         Parameters
         ----------
         dt : float, optional
-            Seconds; default: the ``interval`` that the policy chose.
+            Seconds, at most ``longest_step_s``; default: the ``interval`` that the policy chose.
         input : array_like, shape (k,)
             What drove the process in that time, named by ``process.input``; not given for a process
             without input.
@@ -314,7 +361,7 @@ class GaussianFilter:
         if code == _core.UNCLEAR:
             step = None if dt is None else as_step(dt, self._dtype)
             code = self._filter.predict(step, self._as_input(input))
-        self._require_done(f"predict(dt={dt})", code)
+        self._require_done(f"predict(dt={dt})", code, dt=dt)
 
     def update(
         self,
@@ -366,7 +413,7 @@ class GaussianFilter:
                 hint=f"age_s = {age_s} is more than late_s = {self.late_s} or than the filter "
                 "has run",
             )
-        self._require_done("update", code)
+        self._require_done("update", code, z=z, sensor=sensor, place=place)
 
     def feedback(self, reference: npt.ArrayLike | None = None) -> float:
         """Choose the interval to the next sample, after the update; only with a policy.
@@ -415,7 +462,8 @@ class GaussianFilter:
             A measurement per row, those of smaller sensors filled up with NaN. NaN throughout: the
             measurement is missing and that row only predicts.
         dt : float or array_like, shape (T,)
-            Time from the row before (or the filter's present) to each row, s, not negative. With a
+            Time from the row before (or the filter's present) to each row, s, not negative and at
+            most ``longest_step_s``: a longer one ends the run with a FilterError at its row. With a
             policy the default is the intervals that it chooses; the record must then have been
             sampled at them.
         input : array_like, shape (T, k)
@@ -443,8 +491,13 @@ class GaussianFilter:
         ValueError, TypeError
             If an argument is wrong; the filter is unchanged.
         FilterError
-            If a row cannot be done. ``step`` names it, ``partial`` holds the results before it, and
-            the filter stays at the row before.
+            If a row cannot be done: ``dt`` beyond ``longest_step_s``, a range that the sensor
+            cannot measure, a place far from the origin, numbers that overflow. ``step`` names it,
+            ``partial`` holds the results before it, and the filter stays at the row before; a
+            further ``run`` may go on behind the row.
+        Interrupted
+            After Ctrl-C, a ``KeyboardInterrupt`` within half a second: ``partial`` holds the
+            results so far, and the filter stays at their last row.
         """
         as_flag("covariance", covariance)
         handles, which = self._as_sensor_rows(sensor)
@@ -462,7 +515,7 @@ class GaussianFilter:
                 _require_rows("reference", track, count)
         elif reference is not None:
             raise TypeError("reference must be None: this filter has no interval policy")
-        record = {
+        record: dict[str, Any] = {
             "z": rows,
             "dt": np.full(count, np.nan, self._dtype)
             if dt is None
@@ -474,7 +527,20 @@ class GaussianFilter:
             "sensor": which,
         }
         before = self._before_functions()
-        done, status, columns = self._filter.run(record, handles, covariance)
+        with self._taken() as core:
+            done, status, columns, interrupted = in_slices(
+                count,
+                8 if self._slow else first_slice(),
+                lambda first, end: core.run(
+                    {
+                        name: None if column is None else column[first:end]
+                        for name, column in record.items()
+                    },
+                    handles,
+                    covariance,
+                ),
+                Status.ok,
+            )
         if status == Status.ok:
             self._require_functions_done(before)
         for name in ("P", "S") if not covariance else ():
@@ -488,13 +554,41 @@ class GaussianFilter:
         }
         result = RunResult(**kept)
         if status != Status.ok:
-            error = FilterError("run", status, step=done, partial=result)
+            model = sensor if which is None else np.asarray(sensor)[done].item()
+            hint = self._why(
+                status,
+                dt=None if dt is None else record["dt"][done],
+                z=rows[done],
+                sensor=model,
+                place=None if record["place"] is None else record["place"][done],
+            )
+            error = FilterError("run", status, step=done, partial=result, hint=hint)
             try:
                 require_none_raised()
             except Exception as cause:
                 raise error from cause
             raise error
+        if interrupted:
+            raise Interrupted(result)
         return result
+
+    @property
+    def _slow(self) -> bool:
+        """Whether every step calls functions of Python."""
+        models = (self._process, *self._sensors.values())
+        return any(isinstance(model, (FunctionProcess, FunctionSensor)) for model in models)
+
+    @contextmanager
+    def _taken(self) -> Iterator[_Filter[Any]]:
+        """Keep other threads out between the slices of a record too."""
+        if vars(self).setdefault("_run", token := object()) is not token:  # atomic
+            self._filter.x  # noqa: B018  (says that the filter is in use)
+        core, self._filter = self._filter, InUse()  # type: ignore[assignment]
+        try:
+            yield core
+        finally:
+            self._filter = core
+            del self._run
 
     # ---- State ----------------------------------------------------------------------------------
 
@@ -540,28 +634,75 @@ class GaussianFilter:
             parameters and precision. The filter is then unchanged.
         """
         arrays = unpack(state, type(self).__name__, self._description())
+        require(arrays, self._saved_dtypes(), optional="report_")
+        if arrays["status"].shape != () or int(arrays["status"]) not in _STATUSES:
+            raise ValueError("state is damaged: there is no such status")
         status = Status(int(arrays.pop("status")))
-        models = json.loads(arrays.pop("event_models").tobytes())
-        own = {handle.description: handle for handle in self._handles.values()}
-        handles = [own.get(json.dumps(model)) or self._rebuilt(model) for model in models]
-        events = [None if k < 0 else handles[k] for k in arrays.pop("event_sensor")]
-        report: dict[str, Any] | None = None
-        if "report_nis" in arrays:
-            flags = [int(flag) for flag in arrays.pop("report_flags")]
-            report = {name: arrays.pop(f"report_{name}").ravel() for name in _REPORT}
-            report["nis"] = float(arrays.pop("report_nis"))
-            report["near_field"], report["recovered"] = bool(flags[0]), bool(flags[3])
-            report["decision"], report["iterations"] = Decision(flags[1]), flags[2]
+        self._require_interval(arrays["policy"])
+        states = len(self._process.state)
+        _require_correlations(arrays["P"], states)
+        _require_correlations(arrays["base"][states : states + states * states], states)
+        events = self._remembered(arrays.pop("event_models"), arrays.pop("event_sensor"))
+        report = _saved_report(arrays)
+        twin = self._filter.copy()
         try:
-            self._filter.restore(arrays, events)
+            twin.restore(arrays, events)
         except _core.StatusError as error:
             raise ValueError(f"state is refused: {error}") from None
-        self._filter.set_report(report, status)
+        twin.set_report(report, status)
+        self._filter = twin
+
+    def _saved_dtypes(self) -> dict[str, npt.DTypeLike]:
+        """Give the arrays of a saved state."""
+        numbers = ("x", "P", "input", "policy", "recovery", "base", "events")
+        report = (*(f"report_{name}" for name in _REPORT), "report_nis")
+        whole = ("status", "event_sensor", "report_flags")
+        return {
+            **dict.fromkeys((*numbers, *report), self._dtype),
+            **dict.fromkeys(whole, np.dtype(np.int64)),
+            "event_models": np.dtype(np.uint8),
+        }
+
+    def _require_interval(self, saved: Floats) -> None:
+        """Refuse an interval, and a memory of the interval law, that the policy cannot have."""
+        if self._policy is None or len(saved) != 9:  # how many there are is the core's to say
+            return
+        number = self._dtype.type
+        law: dict[str, tuple[float, float]] = {}
+        if isinstance(self._policy, FixedInterval):
+            law["interval"] = (self._policy.interval_s, self._policy.interval_s)
+        else:
+            law["interval"] = (self._policy.min_s, self._policy.max_s)
+        if isinstance(self._policy, MahalanobisInterval):
+            law["tau"] = (self._policy.tau_min, self._policy.tau_max)
+            law["interval of the law"] = law["interval"]
+            law["ratio"] = (0.0, self._policy.ratio_max)
+            law["mahalanobis_squared"] = (0.0, np.inf)
+        places = ("interval", "tau", "interval of the law", "ratio", "mahalanobis_squared")
+        for name, value in zip(places, saved, strict=False):
+            low, high = law.get(name, (-np.inf, np.inf))
+            if not number(low) <= value <= number(high):
+                raise ValueError(f"state is damaged: {name} is {value}, limits {low} and {high}")
+
+    def _remembered(
+        self, models: npt.NDArray[np.uint8], sensor: npt.NDArray[np.int64]
+    ) -> list[_Sensor[Any] | None]:
+        """Give the core's sensor of each event; None where it is a prediction."""
+        try:
+            described = json.loads(models.tobytes())
+            own = {handle.description: handle for handle in self._handles.values()}
+            handles = [own.get(json.dumps(model)) or self._rebuilt(model) for model in described]
+        except (ValueError, TypeError, RecursionError) as error:
+            raise ValueError(f"state is damaged: its models cannot be made: {error}") from None
+        if sensor.ndim != 1 or ((sensor < -1) | (sensor >= len(handles))).any():
+            raise ValueError("state is damaged: an event names a sensor that is not there")
+        return [None if k < 0 else handles[k] for k in sensor]
 
     def _rebuilt(self, description: dict[str, Any]) -> _Sensor[Any]:
         model: MeasurementModel = as_instance(
             "state", from_description(description), MeasurementModel
         )
+        model.check_process(self._process)
         return model.core(len(self._process.state), self._dtype)
 
     def _description(self) -> dict[str, Any]:
@@ -743,11 +884,84 @@ class GaussianFilter:
             self._filter = before
             raise
 
-    def _require_done(self, action: str, code: int) -> None:
+    def _require_done(self, action: str, code: int, **given: Any) -> None:
         if code == 0:
             return
         require_none_raised()
-        raise FilterError(action, Status(code)) from None
+        raise FilterError(action, Status(code), hint=self._why(Status(code), **given)) from None
+
+    def _why(
+        self,
+        status: Status,
+        *,
+        dt: Any = None,
+        z: Any = None,
+        sensor: Any = None,
+        place: Any = None,
+    ) -> str:
+        """Explain a status that says less than is known here; empty for the others."""
+        if status == Status.step_too_long:
+            step = "the interval of the policy" if dt is None else f"dt = {float(dt):.6g} s"
+            return (
+                f"{step} is longer than longest_step_s = {self.longest_step_s:g} s: did the clock "
+                "jump, or is it in another unit?"
+            )
+        if status == Status.impossible_range:
+            name, model = self._named_sensor(sensor)
+            limits = ""
+            if hasattr(model, "smallest_range_m") and hasattr(model, "largest_range_m"):
+                limits = (
+                    f"; its ranges are {model.smallest_range_m:g} to {model.largest_range_m:g} m"
+                )
+            first = float(np.ravel(np.asarray(z))[0])
+            return (
+                f"{name} cannot measure a range of {first:g} m{limits}; NaN is for no measurement"
+            )
+        if status == Status.far_from_origin:
+            if place is None:
+                return far_from_origin("x", self.x[:2], self._dtype)
+            return far_from_origin("place", np.asarray(place), self._dtype)
+        return ""
+
+    def _named_sensor(self, sensor: str | MeasurementModel | None) -> tuple[str, MeasurementModel]:
+        if isinstance(sensor, MeasurementModel):
+            return type(sensor).__name__, sensor
+        name = next(iter(self._sensors)) if sensor is None else sensor
+        return name, self._sensors[name]
+
+
+def _require_correlations(saved: Floats, states: int) -> None:
+    """Refuse a covariance with a correlation beyond 1, whose elimination may leave the range."""
+    if saved.size != states * states:  # how many there are is the core's to say
+        return
+    covariance = saved.reshape(states, states).astype(np.float64)
+    sigma = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
+    if (np.abs(covariance) > 1.001 * np.outer(sigma, sigma)).any():
+        raise ValueError("state is damaged: its covariance has a correlation beyond 1")
+
+
+def _saved_report(arrays: dict[str, npt.NDArray[Any]]) -> dict[str, Any] | None:
+    """Take the report out of the arrays of a saved state."""
+    if "report_nis" not in arrays:
+        return None
+    found: dict[str, Any] = {name: arrays.pop(f"report_{name}") for name in _REPORT}
+    nis, flags = arrays.pop("report_nis"), arrays.pop("report_flags")
+    size = found["innovation"].size
+    right = nis.shape == () and flags.shape == (4,) and found["S"].shape == (size, size)
+    right = right and all(found[name].shape == (size,) for name in _REPORT if name != "S")
+    if not right or not 1 <= size <= _LARGEST_REPORT or ((flags < 0) | (flags > 255)).any():
+        raise ValueError("state is damaged: its report is none")
+    if int(flags[1]) not in _DECISIONS:
+        raise ValueError("state is damaged: there is no such decision")
+    report = {name: array.ravel() for name, array in found.items()}
+    return {
+        **report,
+        "nis": float(nis),
+        "near_field": bool(flags[0]),
+        "decision": Decision(int(flags[1])),
+        "iterations": int(flags[2]),
+        "recovered": bool(flags[3]),
+    }
 
 
 def _as_sensors(sensors: Sensors, process: ProcessModel) -> dict[str, MeasurementModel]:

@@ -1,24 +1,80 @@
 """From published recordings to logs: one function per set, ``importer(source, output)``.
 
-Each writes one or more log folders below ``output`` and returns their paths. Nothing is filtered
-or corrected on the way, except where a function's docstring says so.
+Each writes one or more log folders below ``output`` and returns their paths, all of them or none.
+Nothing is filtered or corrected on the way, except where a function's docstring says so; what no
+log could hold is refused, with the file and the line it stands in.
 """
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Callable, Mapping
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
+from typing import Protocol, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
-from auvest.logs.reader import LogError, Rows
+from auvest._outputs import NewFolder, OutputError, is_plain_file
+from auvest.logs.reader import LogError, LogFolder, Rows
 from auvest.logs.write import write_file
 
-Importer = Callable[[Path, Path], list[Path]]
+#: The columns of each file of a log.
+Log: TypeAlias = dict[str, dict[str, npt.NDArray[np.generic]]]
+
+#: Columns that hold whole numbers, in every set.
+_WHOLE = frozenset({"beacon", "module", "observer", "robot", "subject", "valid"})
 
 
-def goats14(source: Path, output: Path) -> list[Path]:
+class Importer(Protocol):
+    """Writes the logs of a set below a folder and returns where."""
+
+    def __call__(self, source: Path, output: Path, *, force: bool = False) -> list[Path]:
+        """See :class:`auvest._outputs.NewFolder` for ``force``."""
+
+
+def _importer(read: Callable[[Path], dict[str, Log]]) -> Importer:
+    """Make an importer of what reads a set: logs by the names of their folders."""
+
+    @functools.wraps(read)
+    def write(source: Path, output: Path, *, force: bool = False) -> list[Path]:
+        logs = read(source)
+        with ExitStack() as stack:
+            made = []
+            for name, log in logs.items():
+                _require_apart(source, output / name)
+                new = NewFolder(output / name, f"import {read.__name__}", force=force)
+                made.append(stack.enter_context(new))
+                for file, columns in log.items():
+                    # A robot may have met nobody; without anything else there is no log.
+                    if file != "ranges.csv" and not len(next(iter(columns.values()))):
+                        raise LogError(source, f"nothing is left for {file} of {name}")
+                    try:
+                        write_file(new.part, file, **columns)
+                    except ValueError as error:
+                        raise LogError(source, f"no log can be made of this: {error}") from None
+                LogFolder(new.part)
+            for new in made:
+                new.publish()
+        return [new.path for new in made]
+
+    return write
+
+
+def _require_apart(source: Path, target: Path) -> None:
+    """Refuse to write into a recording, and to replace a folder that holds it."""
+    given, wanted = source.resolve(), target.resolve()
+    if given.is_relative_to(wanted) or wanted.is_relative_to(given):
+        raise OutputError(
+            f"the log would be {target}, in or above its source {source}: name another OUT"
+        )
+
+
+@_importer
+def goats14(source: Path) -> dict[str, Log]:
     """AUV with acoustic beacons (GOATS 2002, set 14).
 
     The odometry's forward axis is +y; here it is turned to forward and left. Truth is the robust
@@ -29,75 +85,70 @@ def goats14(source: Path, output: Path) -> list[Path]:
     beacons = _table(source / "beacons.csv", "beacon", "x", "y")
     reference = _table(source / "reference_batch.csv", "t", "x", "y")
     onboard = _table(source / "groundtruth.csv", "t", "theta")
-    folder = output / "goats14"
-    write_file(
-        folder,
-        "odometry.csv",
-        time_s=odometry[:, 0],
-        forward_m=odometry[:, 2],
-        left_m=-odometry[:, 1],
-        turn_rad=odometry[:, 3],
-    )
-    _write_ranges(folder, ranges)
-    _write_beacons(folder, beacons)
-    _write_truth(folder, reference)
-    _write_start(folder, reference[0], float(onboard[0, 1]) + math.pi / 2)
-    return [folder]
+    log = {
+        "odometry.csv": _steps(odometry[:, 0], odometry[:, 2], -odometry[:, 1], odometry[:, 3]),
+        "ranges.csv": _ranges(ranges),
+        "beacons.csv": _beacons(beacons),
+        "truth.csv": _truth(reference),
+        "start.csv": _start(reference[0], float(onboard[0, 1]) + math.pi / 2),
+    }
+    return {"goats14": log}
 
 
-def hat_charles(source: Path, output: Path) -> list[Path]:
+@_importer
+def hat_charles(source: Path) -> dict[str, Log]:
     """Dead-reckoning slave and one moving leader (Charles River, 2022).
 
     A message whose range and leader position both repeat those of the message before it is stale
     and left out (3 of 56).
     """
     odometry = _table(source / "odometry.csv", "t", "dx_body", "dy_body", "dtheta")
-    messages = _table(
-        source / "leader_ranges.csv", "t", "leader_x", "leader_y", "leader_pos_var", "range"
-    )
+    path = source / "leader_ranges.csv"
+    messages = _table(path, "t", "leader_x", "leader_y", "leader_pos_var", "range")
+    negative = np.flatnonzero(messages[:, 3] < 0)
+    if negative.size:
+        k = int(negative[0])
+        raise LogError(
+            path, f"a variance of {messages[k, 3]:g}", line=k + 2, column="leader_pos_var"
+        )
     truth = _table(source / "groundtruth.csv", "t", "x", "y", "theta")
     fresh = np.append(True, (np.diff(messages[:, [1, 2, 4]], axis=0) != 0).any(axis=1))
     messages = messages[fresh]
-    leader = np.ones(len(messages), int)
-    folder = output / "hat_charles"
-    write_file(
-        folder,
-        "odometry.csv",
-        time_s=odometry[:, 0],
-        forward_m=odometry[:, 1],
-        left_m=odometry[:, 2],
-        turn_rad=odometry[:, 3],
-    )
-    write_file(folder, "ranges.csv", time_s=messages[:, 0], source=leader, range_m=messages[:, 4])
-    write_file(
-        folder,
-        "leaders.csv",
-        time_s=messages[:, 0],
-        source=leader,
-        x_m=messages[:, 1],
-        y_m=messages[:, 2],
-        sigma_m=np.sqrt(messages[:, 3]),
-    )
-    _write_truth(folder, truth)
-    return [folder]
+    leader = np.ones(len(messages))
+    log = {
+        "odometry.csv": _steps(*odometry.T),
+        "ranges.csv": _ranges(np.column_stack([messages[:, 0], leader, messages[:, 4]])),
+        "leaders.csv": {
+            "time_s": messages[:, 0],
+            "source": leader.astype(int),
+            "x_m": messages[:, 1],
+            "y_m": messages[:, 2],
+            "sigma_m": np.sqrt(messages[:, 3]),
+        },
+        "truth.csv": _truth(truth),
+    }
+    return {"hat_charles": log}
 
 
-def labyrinth_uwb(source: Path, output: Path) -> list[Path]:
+@_importer
+def labyrinth_uwb(source: Path) -> dict[str, Log]:
     """Small robot and four UWB modules (TU Chemnitz)."""
     ranges = _table(source / "ranges.csv", "t", "module", "range", "module_x", "module_y")
     odometry = _table(source / "odometry.csv", "t", "v", "w")
     truth = _table(source / "groundtruth.csv", "t", "x", "y")
     heading = _table(source / "initial_heading.txt")
-    folder = output / "labyrinth_uwb"
-    _write_velocity(folder, odometry)
-    _write_ranges(folder, ranges)
-    _write_beacons(folder, np.unique(ranges[:, [1, 3, 4]], axis=0))
-    _write_truth(folder, truth)
-    _write_start(folder, truth[0], float(heading[0, 0]))
-    return [folder]
+    log = {
+        "odometry.csv": _velocity(odometry),
+        "ranges.csv": _ranges(ranges),
+        "beacons.csv": _beacons(np.unique(ranges[:, [1, 3, 4]], axis=0)),
+        "truth.csv": _truth(truth),
+        "start.csv": _start(truth[0], float(heading[0, 0])),
+    }
+    return {"labyrinth_uwb": log}
 
 
-def mrclam6(source: Path, output: Path) -> list[Path]:
+@_importer
+def mrclam6(source: Path) -> dict[str, Log]:
     """Five ground robots; each in turn is the slave that ranges to the four others.
 
     Sightings in both directions are ranges of the slave, their bearings are left out. The others'
@@ -107,20 +158,21 @@ def mrclam6(source: Path, output: Path) -> list[Path]:
     odometry = _table(source / "odometry.csv", "robot", "t", "v", "w")
     truth = _table(source / "groundtruth.csv", "robot", "t", "x", "y", "theta")
     robots = np.unique(truth[:, 0]).astype(int).tolist()
-    return _write_robots(
-        output,
+    return _robots(
+        source,
         sightings,
         {robot: odometry[odometry[:, 0] == robot, 1:] for robot in robots},
         {robot: truth[truth[:, 0] == robot, 1:] for robot in robots},
     )
 
 
-def mrclam(source: Path, output: Path) -> list[Path]:
+@_importer
+def mrclam(source: Path) -> dict[str, Log]:
     """Read the original text files of any UTIAS MR.CLAM set: Barcodes.dat, Robot1_Odometry.dat ...
 
     As :func:`mrclam6`, with all of the motion capture. Time is counted from the first second of it.
     """
-    barcodes = {int(code): int(subject) for subject, code in _text(source / "Barcodes.dat", 2)}
+    barcodes = {code: int(subject) for subject, code in _text(source / "Barcodes.dat", 2)}
     robots = range(1, 6)
     truth = {robot: _text(source / f"Robot{robot}_Groundtruth.dat", 4) for robot in robots}
     start = math.floor(min(track[0, 0] for track in truth.values()))
@@ -130,30 +182,34 @@ def mrclam(source: Path, output: Path) -> list[Path]:
         truth[robot][:, 0] -= start
         odometry[robot][:, 0] -= start
         seen = _text(source / f"Robot{robot}_Measurement.dat", 4)
-        subject = np.array([barcodes.get(int(code), -1) for code in seen[:, 1]], float)
+        subject = np.array([barcodes.get(code, -1) for code in seen[:, 1]], float)
         observer = np.full(len(seen), float(robot))
         sightings.append(np.column_stack([seen[:, 0] - start, observer, subject, seen[:, 2]]))
-    return _write_robots(output, np.concatenate(sightings), odometry, truth)
+    return _robots(source, np.concatenate(sightings), odometry, truth)
 
 
-def ugps_pier59(source: Path, output: Path) -> list[Path]:
+@_importer
+def ugps_pier59(source: Path) -> dict[str, Log]:
     """ROV tracked by a fixed antenna; the two recordings, polls without a fix left out."""
-    folders = []
+    logs: dict[str, Log] = {}
     for number in (1, 2):
-        fixes = _table(source / f"fixes_{number}.csv", "t", "valid", "x_fwd", "y_stbd")
-        fixes = fixes[fixes[:, 1] == 1]
-        folder = output / f"ugps_pier59_{number}"
-        write_file(
-            folder,
-            "fixes.csv",
-            time_s=fixes[:, 0],
-            source=np.zeros(len(fixes), int),
-            range_m=np.hypot(fixes[:, 2], fixes[:, 3]),
-            bearing_rad=np.arctan2(fixes[:, 3], fixes[:, 2]),
-        )
-        _write_beacons(folder, np.zeros((1, 3)))
-        folders.append(folder)
-    return folders
+        path = source / f"fixes_{number}.csv"
+        fixes = _table(path, "t", "valid", "x_fwd", "y_stbd", missing=("x_fwd", "y_stbd"))
+        valid = fixes[:, 1] == 1
+        unknown = np.flatnonzero(valid & np.isnan(fixes).any(axis=1))
+        if unknown.size:
+            raise LogError(path, "a valid fix without a position", line=int(unknown[0]) + 2)
+        fixes = fixes[valid]
+        logs[f"ugps_pier59_{number}"] = {
+            "fixes.csv": {
+                "time_s": fixes[:, 0],
+                "source": np.zeros(len(fixes), int),
+                "range_m": np.hypot(fixes[:, 2], fixes[:, 3]),
+                "bearing_rad": np.arctan2(fixes[:, 3], fixes[:, 2]),
+            },
+            "beacons.csv": _beacons(np.zeros((1, 3))),
+        }
+    return logs
 
 
 #: What ``auvest import`` knows.
@@ -167,98 +223,158 @@ IMPORTERS: Mapping[str, Importer] = {
 }
 
 
-def _write_robots(
-    output: Path, sightings: Rows, odometry: Mapping[int, Rows], truth: Mapping[int, Rows]
-) -> list[Path]:
+def _robots(
+    source: Path, sightings: Rows, odometry: Mapping[int, Rows], truth: Mapping[int, Rows]
+) -> dict[str, Log]:
     sightings = sightings[np.argsort(sightings[:, 0], kind="stable")]
-    folders = []
+    logs: dict[str, Log] = {}
     for robot in truth:
         others = [other for other in truth if other != robot]
+        if not others:
+            raise LogError(source, "one robot alone has nobody to range to")
         observer, subject = sightings[:, 1], sightings[:, 2]
         mine = (observer == robot) & np.isin(subject, others)
         mine |= (subject == robot) & np.isin(observer, others)
         other = np.where(observer == robot, subject, observer)
-        folder = output / f"robot{robot}"
-        _write_velocity(folder, odometry[robot])
-        _write_ranges(folder, np.column_stack([sightings[:, 0], other, sightings[:, 3]])[mine])
         tracks = [np.insert(truth[leader], 1, leader, axis=1) for leader in others]
         leaders = np.concatenate(tracks)
         leaders = leaders[np.argsort(leaders[:, 0], kind="stable")]
-        write_file(
-            folder,
-            "leaders.csv",
-            time_s=leaders[:, 0],
-            source=leaders[:, 1].astype(int),
-            x_m=leaders[:, 2],
-            y_m=leaders[:, 3],
-        )
-        _write_truth(folder, truth[robot])
-        folders.append(folder)
-    return folders
+        logs[f"robot{robot}"] = {
+            "odometry.csv": _velocity(odometry[robot]),
+            "ranges.csv": _ranges(np.column_stack([sightings[:, 0], other, sightings[:, 3]])[mine]),
+            "leaders.csv": {
+                "time_s": leaders[:, 0],
+                "source": leaders[:, 1].astype(int),
+                "x_m": leaders[:, 2],
+                "y_m": leaders[:, 3],
+            },
+            "truth.csv": _truth(truth[robot]),
+        }
+    return logs
 
 
-def _write_velocity(folder: Path, rows: Rows) -> None:
-    write_file(
-        folder, "odometry.csv", time_s=rows[:, 0], speed_m_s=rows[:, 1], yaw_rate_rad_s=rows[:, 2]
-    )
+_Columns: TypeAlias = dict[str, npt.NDArray[np.generic]]
 
 
-def _write_ranges(folder: Path, rows: Rows) -> None:
-    source = rows[:, 1].astype(int)
-    write_file(folder, "ranges.csv", time_s=rows[:, 0], source=source, range_m=rows[:, 2])
+def _steps(time_s: Rows, forward_m: Rows, left_m: Rows, turn_rad: Rows) -> _Columns:
+    return {"time_s": time_s, "forward_m": forward_m, "left_m": left_m, "turn_rad": turn_rad}
 
 
-def _write_beacons(folder: Path, rows: Rows) -> None:
-    source = rows[:, 0].astype(int)
-    write_file(folder, "beacons.csv", source=source, x_m=rows[:, 1], y_m=rows[:, 2])
+def _velocity(rows: Rows) -> _Columns:
+    return {"time_s": rows[:, 0], "speed_m_s": rows[:, 1], "yaw_rate_rad_s": rows[:, 2]}
 
 
-def _write_truth(folder: Path, rows: Rows) -> None:
+def _ranges(rows: Rows) -> _Columns:
+    return {"time_s": rows[:, 0], "source": rows[:, 1].astype(int), "range_m": rows[:, 2]}
+
+
+def _beacons(rows: Rows) -> _Columns:
+    return {"source": rows[:, 0].astype(int), "x_m": rows[:, 1], "y_m": rows[:, 2]}
+
+
+def _truth(rows: Rows) -> _Columns:
     heading = {"heading_rad": _wrapped(rows[:, 3])} if rows.shape[1] == 4 else {}
-    write_file(folder, "truth.csv", time_s=rows[:, 0], x_m=rows[:, 1], y_m=rows[:, 2], **heading)
+    return {"time_s": rows[:, 0], "x_m": rows[:, 1], "y_m": rows[:, 2], **heading}
 
 
-def _write_start(folder: Path, row: Rows, heading: float) -> None:
-    write_file(
-        folder,
-        "start.csv",
-        time_s=row[:1],
-        x_m=row[1:2],
-        y_m=row[2:3],
-        heading_rad=_wrapped(np.array([heading])),
-    )
+def _start(row: Rows, heading: float) -> _Columns:
+    wrapped = _wrapped(np.array([heading]))
+    return {"time_s": row[:1], "x_m": row[1:2], "y_m": row[2:3], "heading_rad": wrapped}
 
 
 def _wrapped(angle: Rows) -> Rows:
     return np.angle(np.exp(1j * angle))
 
 
-def _table(path: Path, *names: str) -> Rows:
-    """Columns of a CSV file by name; without names all of a file that has no header."""
-    try:
-        with path.open(encoding="utf-8") as file:
-            header = file.readline().strip().split(",") if names else []
-            missing = [name for name in names if name not in header]
-            if missing:
-                raise LogError(path, f"has no column {missing[0]}: is this the set named?", line=1)
-            rows = np.loadtxt(file, delimiter=",", ndmin=2)
-    except OSError as error:
-        raise LogError(path, f"cannot be read: {error.strerror or error}") from None
-    except ValueError as error:
-        if isinstance(error, LogError):
-            raise
-        raise LogError(path, f"is not a table of numbers: {error}") from None
-    return rows[:, [header.index(name) for name in names]] if names else rows
+def _table(path: Path, *names: str, missing: tuple[str, ...] = ()) -> Rows:
+    """Columns of a CSV file by name; without names all of a file that has no header.
+
+    NaN is let pass in the columns ``missing`` alone.
+    """
+    lines = _lines(path)
+    header = lines.pop(0).strip().split(",") if names and lines else []
+    for name in names:
+        if header.count(name) != 1:
+            raise LogError(path, f"has no column {name}: is this the set named?", line=1)
+    numbers = range(2 if names else 1, len(lines) + 2)
+    rows = _numbers(path, lines, numbers, ",", len(header))
+    if names:
+        rows = rows[:, [header.index(name) for name in names]]
+    for k in range(rows.shape[1]):
+        name = names[k] if names else ""
+        good = np.isfinite(rows[:, k])
+        if name in missing:
+            good |= np.isnan(rows[:, k])
+        if name in _WHOLE:
+            good &= (np.abs(rows[:, k]) <= 1e9) & (rows[:, k] == np.floor(rows[:, k]))
+        _require(path, rows[:, k], good, numbers, name or None)
+    return rows
 
 
 def _text(path: Path, columns: int) -> Rows:
     """Columns of one of the UTIAS files: white space between numbers, comments after ``#``."""
-    try:
-        rows: Rows = np.loadtxt(path, comments="#", ndmin=2)
-    except OSError as error:
-        raise LogError(path, f"cannot be read: {error.strerror or error}") from None
-    except ValueError as error:
-        raise LogError(path, f"is not a table of numbers: {error}") from None
-    if rows.shape[1] != columns or len(rows) == 0:
-        raise LogError(path, f"must have rows of {columns} numbers, not {rows.shape}")
+    lines = [line.partition("#")[0] for line in _lines(path)]
+    numbers = [k for k, line in enumerate(lines, start=1) if line.strip()]
+    rows = _numbers(path, [lines[k - 1] for k in numbers], numbers, None, columns)
+    for k in range(columns):
+        _require(path, rows[:, k], np.isfinite(rows[:, k]), numbers, None)
     return rows
+
+
+def _lines(path: Path) -> list[str]:
+    try:
+        if path.exists() and not is_plain_file(path):
+            raise LogError(path, "is not a file")
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = "is not UTF-8 text" if isinstance(error, ValueError) else error.strerror or error
+        raise LogError(path, f"cannot be read: {reason}") from None
+    if text and not text.endswith("\n"):
+        raise LogError(path, "does not end with a line end: truncated", line=text.count("\n") + 1)
+    return text.splitlines()
+
+
+def _numbers(
+    path: Path, lines: list[str], numbers: Sequence[int], between: str | None, columns: int
+) -> Rows:
+    """Read rows of so many numbers (0: of as many as the first has) from lines of these numbers."""
+    while lines and not lines[-1].strip():
+        lines.pop()
+    if not lines:
+        raise LogError(path, "has no rows")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of a file of blank lines, which is refused below
+            rows: Rows = np.loadtxt(lines, delimiter=between, comments=None, ndmin=2)
+    except ValueError:
+        rows = np.empty((0, 0))
+    columns = columns or rows.shape[1] or 1
+    if rows.shape == (len(lines), columns):
+        return rows
+    for number, line in zip(numbers, lines, strict=False):
+        cells = line.split(between)
+        if len(cells) != columns:
+            raise LogError(path, f"{len(cells)} cells, expected {columns}: truncated?", line=number)
+        for cell in cells:
+            try:
+                float(cell.replace("_", "?"))  # 1_000 is Python's, not a number
+            except ValueError:
+                what = (
+                    f"{cell.strip()[:40]!r} is not a number" if cell.strip() else "a cell is empty"
+                )
+                raise LogError(path, what, line=number) from None
+    raise LogError(path, "is not a table of numbers")
+
+
+def _require(
+    path: Path,
+    values: Rows,
+    good: npt.NDArray[np.bool_],
+    numbers: Sequence[int],
+    column: str | None,
+) -> None:
+    if good.all():
+        return
+    k = int(np.argmin(good))
+    kind = "an integer" if column in _WHOLE else "a number"
+    raise LogError(path, f"{values[k]:.10g} is not {kind}", line=numbers[k], column=column)

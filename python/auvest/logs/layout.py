@@ -9,19 +9,27 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
 
 _TURN = 2 * math.pi + 1e-6
 
 
 @dataclass(frozen=True)
 class Column:
-    """One column: its name with the unit, the limits of a value, and what lies behind a breach."""
+    """One column: its name with the unit, the limits of a value, and what lies behind a breach.
+
+    ``cause`` is the breach's name in :data:`auvest.logs.findings.CAUSES`.
+    """
 
     name: str
     low: float
     high: float
     suspicion: str = ""
     integer: bool = False
+    cause: str = "unreadable"
 
     @property
     def expected(self) -> str:
@@ -29,23 +37,30 @@ class Column:
         kind = "an integer" if self.integer else "a number"
         return f"{kind} from {self.low:.6g} to {self.high:.6g}"
 
+    def takes(self, values: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
+        """Say of each value whether it can stand in this column; NaN cannot."""
+        good = (values >= self.low) & (values <= self.high)
+        if self.integer:
+            good &= values == np.floor(values)
+        return np.asarray(good, bool)
+
 
 _COLUMNS = {
     column.name: column
     for column in (
-        Column("time_s", -1e11, 1e11, "milliseconds or nanoseconds?"),
+        Column("time_s", -1e11, 1e11, "milliseconds or nanoseconds?", cause="milliseconds"),
         Column("source", 0, 1e9, integer=True),
-        Column("forward_m", -1e4, 1e4, "millimetres?"),
-        Column("left_m", -1e4, 1e4, "millimetres?"),
-        Column("turn_rad", -_TURN, _TURN, "degrees?"),
-        Column("speed_m_s", -50, 50, "millimetres per second?"),
-        Column("yaw_rate_rad_s", -20, 20, "degrees per second?"),
-        Column("range_m", 0, 1e5, "millimetres, or a code for 'no echo'?"),
-        Column("bearing_rad", -_TURN, _TURN, "degrees?"),
-        Column("heading_rad", -_TURN, _TURN, "degrees?"),
-        Column("x_m", -1e7, 1e7, "millimetres?"),
-        Column("y_m", -1e7, 1e7, "millimetres?"),
-        Column("sigma_m", 0, 1e4, "millimetres?"),
+        Column("forward_m", -1e4, 1e4, "millimetres?", cause="millimetres"),
+        Column("left_m", -1e4, 1e4, "millimetres?", cause="millimetres"),
+        Column("turn_rad", -_TURN, _TURN, "degrees?", cause="degrees"),
+        Column("speed_m_s", -50, 50, "millimetres per second?", cause="millimetres"),
+        Column("yaw_rate_rad_s", -20, 20, "degrees per second?", cause="degrees"),
+        Column("range_m", 0, 1e5, "millimetres, or a code for 'no echo'?", cause="millimetres"),
+        Column("bearing_rad", -_TURN, _TURN, "degrees?", cause="degrees"),
+        Column("heading_rad", -_TURN, _TURN, "degrees?", cause="degrees"),
+        Column("x_m", -1e7, 1e7, "millimetres?", cause="millimetres"),
+        Column("y_m", -1e7, 1e7, "millimetres?", cause="millimetres"),
+        Column("sigma_m", 0, 1e4, "millimetres?", cause="millimetres"),
     )
 }
 

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from auvest._outputs import is_plain_file
 from auvest.logs.layout import FILES, Column
 
 Rows = npt.NDArray[np.float64]
@@ -35,10 +36,18 @@ class LogError(ValueError):
         Line of the file, counted from 1; None if the complaint is about the whole file.
     column : str or None
         Name of the column.
+    cause : str
+        What is wrong, one of :data:`auvest.logs.findings.CAUSES`.
     """
 
     def __init__(
-        self, path: Path, message: str, *, line: int | None = None, column: str | None = None
+        self,
+        path: Path,
+        message: str,
+        *,
+        line: int | None = None,
+        column: str | None = None,
+        cause: str = "unreadable",
     ) -> None:
         where = [str(path)]
         if line is not None:
@@ -49,6 +58,7 @@ class LogError(ValueError):
         self.path = path
         self.line = line
         self.column = column
+        self.cause = cause
 
 
 class CsvTable:
@@ -77,6 +87,8 @@ class CsvTable:
     def __init__(self, path: Path) -> None:
         self.path = path
         try:
+            if path.exists() and not is_plain_file(path):  # a pipe would be waited for
+                raise LogError(path, "is not a file")
             self.bytes = path.stat().st_size
             with path.open(encoding="utf-8-sig", newline="\n") as file:
                 header = file.readline()
@@ -85,6 +97,7 @@ class CsvTable:
         except UnicodeDecodeError:
             raise LogError(path, "is not UTF-8 text") from None
         self.bytes_read = 0
+        self._refuse_separator(header)
         names = [name.strip() for name in header.rstrip("\r\n").split(",")]
         self.columns = self._match(names)
         self._order = [names.index(column.name) for column in self.columns]
@@ -104,14 +117,16 @@ class CsvTable:
             At the first line that is not what the layout says.
         """
         line = 2
+        blank: list[str] = []  # such lines at the end of the file are none, others are errors
         try:
             with self.path.open(encoding="utf-8-sig", newline="\n") as file:
                 self.bytes_read = len(file.readline())
-                while lines := list(islice(file, CHUNK_LINES)):
-                    rows = self._parse(lines, line)
-                    self.bytes_read += sum(map(len, lines))
-                    yield rows, line
-                    line += len(lines)
+                while chunk := list(islice(file, CHUNK_LINES)):
+                    self.bytes_read += sum(map(len, chunk))
+                    lines, blank = _without_blank_end(blank + chunk)
+                    if lines:
+                        yield self._parse(lines, line), line
+                        line += len(lines)
         except OSError as error:
             raise LogError(self.path, f"cannot be read: {error.strerror or error}") from None
         except UnicodeDecodeError:
@@ -131,6 +146,26 @@ class CsvTable:
                 raise LogError(self.path, f"has more than {SMALL_FILE_LINES} lines")
             parts.append(rows)
         return np.concatenate(parts) if parts else np.empty((0, len(self.columns)))
+
+    def line_of(self, time_s: float, occurrence: int) -> int | None:
+        """Line at which a time stands for the n-th time, to name it in an error."""
+        for rows, first in self.chunks():
+            found = np.flatnonzero(rows[:, 0] == time_s)
+            if len(found) >= occurrence:
+                return first + int(found[occurrence - 1])
+            occurrence -= len(found)
+        return None
+
+    def _refuse_separator(self, header: str) -> None:
+        for mark, name in ((";", "semicolons"), ("\t", "tabs")):
+            if mark in header and "," not in header:
+                raise LogError(
+                    self.path,
+                    f"cells are parted by {name}; the separator is a comma, and the decimal mark a "
+                    "point",
+                    line=1,
+                    cause="separator",
+                )
 
     def _match(self, names: list[str]) -> tuple[Column, ...]:
         layouts = FILES[self.path.name]
@@ -155,9 +190,8 @@ class CsvTable:
                 self.path, "does not end with a line end: truncated", line=first + len(lines) - 1
             )
         rows: Rows = np.empty((0, 0))
-        if lines[0].strip():  # of nothing but blank lines loadtxt would warn
-            with suppress(ValueError):
-                rows = np.loadtxt(lines, delimiter=",", comments=None, ndmin=2)
+        with suppress(ValueError):
+            rows = np.loadtxt(lines, delimiter=",", comments=None, ndmin=2)
         if rows.shape != (len(lines), len(self.columns)):
             rows = np.array([self._parse_line(text, first + i) for i, text in enumerate(lines)])
         if not self._in_order:
@@ -168,9 +202,11 @@ class CsvTable:
     def _parse_line(self, text: str, line: int) -> list[float]:
         cells = text.rstrip("\r\n").split(",")
         if len(cells) != len(self.columns):
+            comma = len(cells) > len(self.columns) and all(map(_digits, cells))
+            why = "decimal commas?" if comma else "truncated?"
             raise LogError(
-                self.path, f"{len(cells)} cells, expected {len(self.columns)}: truncated?",
-                line=line,
+                self.path, f"{len(cells)} cells, expected {len(self.columns)}: {why}",
+                line=line, cause="decimal_comma" if comma else "unreadable",
             )  # fmt: skip
         values = []
         for k, cell in enumerate(cells):
@@ -185,9 +221,7 @@ class CsvTable:
     def _check(self, rows: Rows, first: int) -> None:
         for k, column in enumerate(self.columns):
             values = rows[:, k]
-            good = (values >= column.low) & (values <= column.high)  # false for NaN
-            if column.integer:
-                good &= values == np.floor(values)
+            good = column.takes(values)
             if good.all():
                 continue
             i = int(np.argmin(good))
@@ -199,7 +233,31 @@ class CsvTable:
                 f"{value:.10g} is not {column.expected}{hint}{missing}",
                 line=first + i,
                 column=column.name,
+                cause=_cause(column, value),
             )
+
+
+def _without_blank_end(lines: list[str]) -> tuple[list[str], list[str]]:
+    """Part lines where nothing but blank ones follow."""
+    end = len(lines)
+    while end and not lines[end - 1].strip():
+        end -= 1
+    return lines[:end], lines[end:]
+
+
+def _digits(cell: str) -> bool:
+    """Whether a cell is what a decimal comma leaves of a number."""
+    bare = cell.strip().strip('"').lstrip("+-")
+    return bare.isdecimal() and bare.isascii()
+
+
+def _cause(column: Column, value: float) -> str:
+    """Say what a value beyond its column's limits is a sign of."""
+    if not math.isfinite(value):
+        return "unreadable"
+    if column.name == "time_s":
+        return "milliseconds" if abs(value) < 1e14 else "microseconds"
+    return column.cause if value > 0 or column.low < 0 else "no_echo"
 
 
 class LogFolder:
@@ -209,6 +267,8 @@ class LogFolder:
     ----------
     path : Path
         The folder.
+    truth : bool
+        False: truth.csv is left out where the run does not start from it.
 
     Raises
     ------
@@ -217,17 +277,20 @@ class LogFolder:
         beside them beacons.csv, leaders.csv or both.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, truth: bool = True) -> None:
         self.path = path
         if not path.is_dir():
             raise LogError(path, "is not a folder; a log is a folder of CSV files (docs/logs.md)")
-        self.tables = {name: CsvTable(path / name) for name in FILES if (path / name).exists()}
+        names = [name for name in FILES if (path / name).exists()]
+        if not truth and ("start.csv" in names or "fixes.csv" in names):
+            names = [name for name in names if name != "truth.csv"]
+        self.tables = {name: CsvTable(path / name) for name in names}
         if "fixes.csv" not in self and "ranges.csv" not in self:
             raise LogError(path, "has neither ranges.csv nor fixes.csv")
         if "fixes.csv" in self and "ranges.csv" in self:
             raise LogError(path, "has ranges.csv and fixes.csv; one log is for one filter")
         if "ranges.csv" in self and "odometry.csv" not in self:
-            raise LogError(path, "has ranges.csv but no odometry.csv")
+            raise LogError(path, "has ranges.csv but no odometry.csv", cause="no_odometry")
         if "fixes.csv" in self and "odometry.csv" in self:
             raise LogError(path, "has fixes.csv and odometry.csv; a tracked craft tells nothing")
         if "beacons.csv" not in self and "leaders.csv" not in self:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias, get_args, get_type_hints
 
 from auvest._fields import not_negative, number, positive
+from auvest._outputs import is_plain_file
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -28,6 +29,7 @@ class FilterSettings:
     kind: FilterName | None = None  # None: robust-ekf for ranges, ukf for fixes
     kernel: KernelName = "hampel"  # with the thresholds that are its defaults
     alpha: float = positive(1e-3)
+    longest_step_s: float = positive(3600.0, infinite=True)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,6 +53,7 @@ class OdometrySettings:
     turn_factor: float = positive(1.0)
     turn_offset_rad_s: float = number(0.0)
     max_step_s: float = positive(0.1)  # of velocity odometry
+    gap_s: float = positive(15.0)  # a velocity holds no longer
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,11 +143,15 @@ def read_settings(path: Path) -> Settings:
         range; the message names file, section and key.
     """
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
+        if path.exists() and not is_plain_file(path):
+            raise ValueError(f"{path}: is not a file")
+        document = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise ValueError(f"{path}: cannot be read: {error.strerror or error}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ValueError(f"{path}: is not TOML: {error}") from None
+    except RecursionError:
+        raise ValueError(f"{path}: is not TOML: brackets in brackets without end") from None
     return settings_from(document, str(path))
 
 

@@ -316,6 +316,7 @@ class Localiser(Replay):
             estimates=_estimates(at[1:], states[1:], states[1:, 2], spreads[1:], reckoned[1:]),
             measurements=columns,
             errors=errors,
+            ranges_m=ranges[:, 2],
         )
 
     def _events(self, limit: float, measured: Rows) -> Rows:
@@ -425,7 +426,7 @@ class Tracker(Replay):
             columns["outcome"][first] = tables.ACCEPTED
             used[first] = False
         if not self._started:
-            return _nothing(columns)
+            return _nothing(columns, fixes[:, 2])
 
         if isinstance(self._filter, Aukf):
             x, covariance, used = self._sample(self._filter, fixes, places, used, columns)
@@ -449,6 +450,7 @@ class Tracker(Replay):
             estimates=_estimates(at[1:], states[1:], course, spreads[1:], None),
             measurements=columns,
             errors=self._errors(truth, position, spreads[last_row], nowhere),
+            ranges_m=fixes[:, 2],
         )
 
     def _fuse(
@@ -514,6 +516,7 @@ def _build(
     """Make the filter of this name, with what the settings say of its kind."""
     entry = registry.filter_named(name, registry.replayable())
     kind: type[GaussianFilter] = getattr(auvest, entry.cls)
+    models["longest_step_s"] = settings.filter.longest_step_s
     if issubclass(kind, (RobustEkf, RobustUkf)):
         models["kernel"] = settings.filter.kernel
     if issubclass(kind, Ukf):
@@ -574,11 +577,12 @@ def _estimates(
     }
 
 
-def _nothing(columns: dict[str, npt.NDArray[Any]]) -> Batch:
+def _nothing(columns: dict[str, npt.NDArray[Any]], ranges_m: Rows) -> Batch:
     """Make the batch of a stretch in which the filter did not run yet."""
     empty = np.empty(0)
     return Batch(
         estimates=dict.fromkeys(tables.ESTIMATES, empty),
         measurements=columns,
         errors=dict.fromkeys(tables.ERRORS, empty),
+        ranges_m=ranges_m,
     )

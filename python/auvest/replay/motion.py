@@ -1,6 +1,7 @@
 """Motion between the lines of an odometry file: constant velocity and turn rate in the body frame.
 
-Both kinds of odometry become the same thing. A velocity holds from its line to the next. An
+Both kinds of odometry become the same thing. A velocity holds from its line to the next, but no
+longer than a gap may be; then the craft is taken to stand, for nothing is known. An
 increment is the chord of the arc driven since the line before. Either way a piece of it, of any
 length in time, is again an arc: with velocity u (complex, forward + i left) and turn rate w, in a
 time dt the craft moves by
@@ -70,7 +71,7 @@ class Motion:
 
     def __init__(self, table: CsvTable, start_s: float, settings: OdometrySettings) -> None:
         self.increments = "turn_rad" in table.names
-        self._path = table.path
+        self._table = table
         self._settings = settings
         # Until the first line: nothing is known of increments, and velocity is zero.
         self._segments = Segments(np.array([start_s]), np.zeros(0, complex), np.zeros(0))
@@ -97,17 +98,22 @@ class Motion:
             edges = np.concatenate([[self.known_until], rows[:, 0]])
             dt = np.diff(edges)
             if (dt <= 0).any():
-                time = rows[int(np.argmax(dt <= 0)), 0]
-                raise LogError(self._path, f"two increments end at {time:.10g} s", column="time_s")
+                time = float(rows[int(np.argmax(dt <= 0)), 0])
+                raise LogError(
+                    self._table.path,
+                    f"two increments end at {time:.10g} s",
+                    line=self._table.line_of(time, 2),
+                    column="time_s",
+                    cause="times_equal",
+                )
             turn = s.turn_factor * rows[:, 3] + s.turn_offset_rad_s * dt
             chord = s.speed_factor * (rows[:, 1] + 1j * rows[:, 2])
             new = Segments(edges[1:], chord / dt / phi(turn), turn / dt)
         else:
             velocity = s.speed_factor * rows[:, 1] + 0j
             turn_rate = s.turn_factor * rows[:, 2] + s.turn_offset_rad_s
-            begin = np.maximum(rows[:, 0], self.known_until)
-            new = Segments(
-                begin,
+            new = self._held_no_longer(
+                np.maximum(rows[:, 0], self.known_until),
                 np.concatenate([[self._held[0]], velocity[:-1]])[: len(rows)],
                 np.concatenate([[self._held[1]], turn_rate[:-1]])[: len(rows)],
             )
@@ -125,10 +131,26 @@ class Motion:
         s = self._segments
         if self.increments or limit <= self.known_until:
             return s
+        end = self._held_no_longer(
+            np.array([limit]), np.array([self._held[0]]), np.array([self._held[1]])
+        )
         return Segments(
-            np.append(s.edges, limit),
-            np.append(s.velocity, self._held[0]),
-            np.append(s.turn_rate, self._held[1]),
+            np.concatenate([s.edges, end.edges]),
+            np.concatenate([s.velocity, end.velocity]),
+            np.concatenate([s.turn_rate, end.turn_rate]),
+        )
+
+    def _held_no_longer(self, edges: Rows, velocity: Complex, turn_rate: Rows) -> Segments:
+        """Segments up to these edges, the first from where the last ends; long ones are parted."""
+        before = np.concatenate([[self.known_until], edges])[: len(edges)]
+        moving = (velocity != 0) | (turn_rate != 0)
+        long = np.flatnonzero(moving & (edges - before > self._settings.gap_s))
+        if len(long) == 0:
+            return Segments(edges, velocity, turn_rate)
+        return Segments(
+            np.insert(edges, long, before[long] + self._settings.gap_s),
+            np.insert(velocity, long + 1, 0.0),
+            np.insert(turn_rate, long + 1, 0.0),
         )
 
     def forget(self, before: float) -> None:

@@ -12,6 +12,7 @@ from matplotlib import rc_context
 
 from auvest.replay import tables
 from auvest.replay.figures import figures
+from auvest.replay.health import Health
 from auvest.replay.run import Result
 
 
@@ -33,14 +34,25 @@ def html(result: Result) -> str:
         title=escape(f"{result.name}: replay with {result.filter_name}"),
         warnings="\n".join(f'<p class="warning">{escape(text)}</p>' for text in warnings(result)),
         numbers=_table(rows(result)),
+        verdict=escape(result.health.verdict.replace("_", " ")),
+        reason=escape(result.health.reason),
+        health=_table(
+            [*sources(result.health), ("not to be trusted", untrusted(result.health) or "nothing")]
+        ),
         pictures=pictures,
         settings=_table(settings),
     )
 
 
 def warnings(result: Result) -> list[str]:
-    """Say what of the log was not used, and why."""
+    """Say what is wrong with the log, what of it was not used, and why."""
     found = ["The run was interrupted; this is what was done until then."] * result.interrupted
+    if result.health.verdict != "sound":
+        words = result.health.verdict.replace("_", " ").upper()
+        found.append(f"{words}: {result.health.reason}.")
+    found += [
+        f"{one.cause}: {one.text}." for one in result.findings if one.text != result.health.reason
+    ]
     for name, late in result.numbers["late"].items():
         if late["dropped"]:
             lines = ", ".join(map(str, late["lines"]))
@@ -63,8 +75,9 @@ def warnings(result: Result) -> list[str]:
 
 def rows(result: Result) -> list[tuple[str, str]]:
     """Give the figures of the run, in words and with units, for tables."""
-    n = result.numbers
+    n, health = result.numbers, result.health
     made = [
+        ("verdict", health.verdict.replace("_", " ")),
         ("time", f"{n['first_s']:.1f} to {n['last_s']:.1f} s"),
         ("measurements", f"{n['measurements']}"),
         *((outcome, f"{n[outcome.replace(' ', '_')]}") for outcome in tables.OUTCOMES[:4]),
@@ -78,6 +91,8 @@ def rows(result: Result) -> list[tuple[str, str]]:
         ("truth within 3 sigma", _share(n["inside_3_sigma"])),
         ("held-out measurements, RMSE", _metres(n["held_out_rmse_m"])),
         ("NIS, mean", _nis(n)),
+        ("NIS within three sigma, mean", _nis_within(health)),
+        ("measurements beyond three sigma", _share(health.beyond_share)),
     ]
     return [(name, text) for name, text in made if text]
 
@@ -95,6 +110,33 @@ def _nis(numbers: dict[str, Any]) -> str:
         return ""
     low, high = numbers["nis_bounds_95"]
     return f"{numbers['nis_mean']:.3f} (consistent: {low:.3f} to {high:.3f})"
+
+
+def _nis_within(health: Health) -> str:
+    if health.nis_mean is None or health.nis_bounds_95 is None:
+        return ""
+    low, high = health.nis_bounds_95
+    return f"{health.nis_mean:.3f} (consistent: {low:.3f} to {high:.3f})"
+
+
+def sources(health: Health) -> list[tuple[str, str]]:
+    """Give what each source's ranges left, in words."""
+    return [
+        (
+            f"source {one.source}",
+            f"{one.measurements} measurements, {100 * one.beyond_share:.0f} % beyond three sigma, "
+            f"median {one.median_m:+.2f} m, spread {one.spread_m:.2f} m, "
+            f"{100 * one.trend:+.2f} % of the range",
+        )
+        for one in health.sources
+    ]
+
+
+def untrusted(health: Health) -> str:
+    """Give the seconds that are not to be trusted, in words."""
+    spans = [f"{a:.1f} to {b:.1f} s" for a, b in health.untrusted_s[:10]]
+    more = " ..." * (len(health.untrusted_s) > len(spans))
+    return ", ".join(spans) + more
 
 
 def _table(lines: list[tuple[str, str]]) -> str:

@@ -10,10 +10,14 @@ from typing import Any
 
 import numpy as np
 
+from auvest._interrupts import HeldInterrupts
 from auvest.logs import LogFolder
-from auvest.replay import tables
+from auvest.logs.findings import Finding
+from auvest.logs.origin import local_origin, shifted
+from auvest.replay import checks, tables
 from auvest.replay.config import FilterName, Settings
 from auvest.replay.engine import Localiser, Replay, Tracker
+from auvest.replay.health import Health, Residuals, health
 from auvest.replay.samples import Samples
 from auvest.replay.tally import Tally
 
@@ -38,6 +42,10 @@ class Result:
         less than full weight.
     sources : ndarray, shape (K, 2)
         Positions of the beacons, m.
+    health : Health
+        Whether it is to be trusted, and why.
+    findings : list of Finding
+        What is wrong with the log, as ``auvest check`` says it.
     interrupted : bool
         True if the run was stopped; all else is then what was done until then.
     """
@@ -51,6 +59,8 @@ class Result:
     errors: Samples
     outliers: Samples
     sources: np.ndarray[Any, np.dtype[np.float64]]
+    health: Health
+    findings: list[Finding]
     interrupted: bool
 
     def document(self) -> dict[str, Any]:
@@ -60,6 +70,8 @@ class Result:
             "filter": self.filter_name,
             "interrupted": self.interrupted,
             **self.numbers,
+            "health": self.health.document(),
+            "findings": [one.document() for one in self.findings],
             "settings": asdict(self.settings),
         }
 
@@ -71,6 +83,7 @@ def replay(
     filter_name: FilterName | None = None,
     folder: Path | None = None,
     progress: ProgressCallback | None = None,
+    causes: bool = True,
 ) -> Result:
     """Replay a log.
 
@@ -87,6 +100,8 @@ def replay(
         Nothing is written without it.
     progress : callable, optional
         Called with the bytes of the log that are read, and all.
+    causes : bool
+        Whether to look for the cause of what does not fit, which takes some dozens of replays.
 
     Returns
     -------
@@ -101,30 +116,39 @@ def replay(
     OSError
         If a file cannot be written.
     """
-    name: FilterName = filter_name or settings.filter.kind or (
-        "ukf" if log.tracking else "robust-ekf"
-    )  # fmt: skip
-    engine: Replay = (Tracker if log.tracking else Localiser)(log, settings, name)
-    tally = Tally()
+    name = checks.filter_of(log, settings, filter_name)
+    origin = local_origin(log)
+    local = log if origin is None else shifted(log, origin)
+    engine: Replay = (Tracker if log.tracking else Localiser)(local, settings, name)
+    tally, residuals = Tally(), Residuals()
+    found: list[Finding] = []
     estimates, errors = Samples(tables.ESTIMATES), Samples(tables.ERRORS)
     measurements, outliers = Samples(tables.MEASUREMENTS), Samples(tables.MEASUREMENTS)
     interrupted = False
     with ExitStack() as stack:
         files = _open(folder, stack)
         try:
+            held = stack.enter_context(HeldInterrupts())
+            found += checks.files(log, settings)
             for batch in engine.batches():
-                tally.add(batch)
-                for write in files:
-                    write(batch)
-                estimates.add(batch.estimates)
-                errors.add(batch.errors)
-                measurements.add(batch.measurements)
-                outliers.add(_outliers(batch.measurements))
+                if origin is not None:
+                    batch = tables.moved(batch, origin)
+                with held:  # so that all tables and figures are of the same rows
+                    residuals.add(batch)
+                    tally.add(batch)
+                    for write in files:
+                        write(batch)
+                    estimates.add(batch.estimates)
+                    errors.add(batch.errors)
+                    measurements.add(batch.measurements)
+                    outliers.add(_outliers(batch.measurements))
                 if progress is not None:
                     progress(engine.bytes_read, engine.bytes)
+            found += checks.innovations(local, settings, name, residuals, found, causes=causes)
         except KeyboardInterrupt:
             interrupted = True
     numbers = tally.numbers()
+    numbers["origin_m"] = None if origin is None else list(origin)
     numbers["late"] = {name: asdict(stream.late) for name, stream in engine.streams.items()}
     return Result(
         name=log.path.resolve().name,
@@ -136,6 +160,8 @@ def replay(
         errors=errors,
         outliers=outliers,
         sources=np.array(list(log.beacons().values())).reshape(-1, 2),
+        health=health(residuals, found),
+        findings=found,
         interrupted=interrupted,
     )
 

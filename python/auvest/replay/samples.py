@@ -20,9 +20,12 @@ class Samples:
     ----------
     columns : tuple of str
         Names of the columns.
+    limit : int, optional
+        How many rows at most, or up to twice as many; default: as many as a figure shows.
     """
 
-    def __init__(self, columns: tuple[str, ...]) -> None:
+    def __init__(self, columns: tuple[str, ...], limit: int | None = None) -> None:
+        self._limit = LIMIT if limit is None else limit
         self._parts: list[Columns] = [{name: np.empty(0) for name in columns}]
         self._stride = 1
         self._seen = 0
@@ -36,7 +39,7 @@ class Samples:
         part = {name: rows[name][first :: self._stride].copy() for name in self._parts[0]}
         self._parts.append(part)
         self._kept += len(part["time_s"])
-        while self._kept > 2 * LIMIT:
+        while self._kept > 2 * self._limit:
             self._stride *= 2
             merged = {name: values[::2].copy() for name, values in self.columns().items()}
             self._parts = [merged]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -36,11 +36,29 @@ ERRORS = (
 
 @dataclass(frozen=True)
 class Batch:
-    """What a stretch of the log gave; each a mapping of the names above to columns."""
+    """What a stretch of the log gave; each a mapping of the names above to columns.
+
+    ``ranges_m`` are the ranges of the measurements as the log has them.
+    """
 
     estimates: Columns
     measurements: Columns
     errors: Columns
+    ranges_m: npt.NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+
+
+def moved(batch: Batch, origin: tuple[float, float]) -> Batch:
+    """Give a batch in coordinates that do not count from a local origin (m)."""
+    columns = {"x_m": 0, "y_m": 1, "dead_reckoned_x_m": 0, "dead_reckoned_y_m": 1,
+               "true_x_m": 0, "true_y_m": 1}  # fmt: skip
+
+    def shift(table: Columns) -> Columns:
+        return {
+            name: values + origin[columns[name]] if name in columns else values
+            for name, values in table.items()
+        }
+
+    return replace(batch, estimates=shift(batch.estimates), errors=shift(batch.errors))
 
 
 def blank_measurements(rows: int) -> dict[str, npt.NDArray[Any]]:

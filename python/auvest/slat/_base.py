@@ -30,7 +30,8 @@ from auvest._arguments import (
     require_range,
 )
 from auvest._core import Status
-from auvest.errors import FilterError
+from auvest._interrupts import first_slice, in_slices
+from auvest.errors import FilterError, Interrupted
 from auvest.slat.models import (
     CompassMotion,
     Master,
@@ -245,6 +246,9 @@ class Steps:
         FilterError
             If a row cannot be done. ``step`` names it, ``partial`` holds the results before it, and
             the filter stays where the step that was refused met it.
+        Interrupted
+            After Ctrl-C, a ``KeyboardInterrupt`` within half a second: ``partial`` holds the
+            results so far, and the filter stays at their last row.
         """
         device = self._as_device(sonar)
         double = np.dtype(np.float64)
@@ -277,10 +281,14 @@ class Steps:
                 numbers = self._as_numbers(None if self._deaf else master, len(echoes))
                 there = ~np.isnan(echoes[:, 0])
                 echoes, numbers, heard_at = echoes[there], numbers[there], heard_at[there]
-            out = self._core_steps.run(
-                times, readings, plan, heard_at, echoes, numbers, device, self._random
+            done, status, out, interrupted = in_slices(
+                rows,
+                first_slice(getattr(self, "particles", 1)),
+                lambda first, end: self._run_slice(
+                    slice(first, end), (times, readings, plan), (heard_at, echoes, numbers), device
+                ),
+                Status.ok,
             )
-            done = out["done"]
             width = int(out["masters"][:done].max(initial=0))
             result = SlatRun(
                 time_s=times[1 : done + 1],
@@ -295,10 +303,35 @@ class Steps:
                 refused=out["refused"][:done],
                 rebirths=out["rebirths"][:done],
             )
-            self._status = out["status"]
+            self._status = status
         if self._status != Status.ok:
             raise FilterError("run", self._status, step=done, partial=result)
+        if interrupted:
+            raise Interrupted(result)
         return result
+
+    def _run_slice(
+        self,
+        rows: slice,
+        moves: tuple[Floats, Floats, Floats],
+        heard: tuple[Floats, Floats, npt.NDArray[np.int64]],
+        device: _core._Sonar,
+    ) -> tuple[int, Status, dict[str, Any]]:
+        """Run some readings of a record, with the echoes up to the end of the last."""
+        times, readings, plan = moves
+        times = times[rows.start : rows.stop + 1]
+        # An echo at the very beginning belongs to the first reading of the record.
+        low = np.searchsorted(heard[0], times[0], "right") if rows.start else 0
+        high = np.searchsorted(heard[0], times[-1], "right")
+        out = self._core_steps.run(
+            times,
+            readings[rows],
+            plan[rows] if len(plan) else plan,
+            *(column[low:high] for column in heard),
+            device,
+            self._random,
+        )
+        return out.pop("done"), out.pop("status"), out
 
     def save(self) -> bytes:
         """Give the whole state, with that of the random numbers, for :meth:`restore`.
@@ -320,10 +353,40 @@ class Steps:
             parameters and precision; the message names what differs. The filter is then unchanged.
         """
         arrays = _state.unpack(state, type(self).__name__, self._description())
+        dtypes = {"numbers": self._dtype, "counts": np.int64, "random": np.uint32}
+        _state.require(arrays, dtypes)
         with self._exclusive:
-            self._core_steps.restore(arrays["numbers"], arrays["counts"])
-            self._random.restore(arrays["random"])
-            self._status = Status.ok
+            twin, random = self._core_steps.copy(), self._random.copy()
+            random.restore(arrays["random"])
+            twin.restore(arrays["numbers"], arrays["counts"])
+            self._require_started(twin, arrays["counts"])
+            self._require_legal(twin)
+            self._core_steps, self._random, self._status = twin, random, Status.ok
+
+    def _require_started(self, core: Any, counts: npt.NDArray[np.int64]) -> None:  # noqa: ARG002
+        """Refuse the state of a filter that was never started: there is none such in Python."""
+        if counts[0] != 1:
+            raise ValueError("state is damaged: it is that of a filter that was not started")
+
+    def _require_legal(self, core: Any) -> None:
+        """Refuse a restored filter of the core whose beliefs are none."""
+        # Rounding may leave a covariance that filters go on with not quite positive.
+        slack = 1e-3 if self._dtype == np.dtype(np.float32) else 1e-9
+        beliefs = {"slave": core.slave()} if self._has_slave(core) else {}
+        beliefs |= {f"master {n}": core.master(n) for n in range(core.masters)}
+        for name, (x, covariance) in beliefs.items():
+            variances = np.diagonal(covariance).astype(np.float64)
+            legal = np.isfinite(x).all() and np.isfinite(covariance).all()
+            legal = legal and bool((variances >= 0).all())
+            if legal:
+                sigma = np.sqrt(np.where(variances > 0, variances, 1.0))
+                correlation = covariance / np.outer(sigma, sigma)
+                legal = np.linalg.eigvalsh(correlation.astype(np.float64))[0] >= -slack
+            if not legal:
+                raise ValueError(f"state is damaged: the belief of the {name} is none")
+
+    def _has_slave(self, core: Any) -> bool:  # noqa: ARG002
+        return True
 
     def __getstate__(self) -> dict[str, Any]:
         in_the_core = ("_core_steps", "_device", "_random", "_exclusive")
@@ -433,7 +496,8 @@ class Steps:
         if master is None:
             if masters > 1 and not self._unknown:
                 raise TypeError(f"master must be given: the filter has {masters} masters")
-            return np.full(count, UNKNOWN_MASTER if self._unknown else 0, np.int64)
+            nobody = self._unknown or masters == 0  # then the core has the word
+            return np.full(count, UNKNOWN_MASTER if nobody else 0, np.int64)
         raw = np.asarray(master)
         if raw.dtype.kind not in "iu":
             raise TypeError(f"master must be an int or an array of int, not of {raw.dtype.name}")
@@ -649,6 +713,14 @@ class ParticleSlatFilter(SlatFilter):
             "resampling": as_kind("resampling", resampling, get_args(Resampling)),
         }
         super().__init__(x0, P0, seed=seed, settings={**own, **settings}, **options)
+
+    def _require_legal(self, core: Any) -> None:
+        super()._require_legal(core)
+        weights = core.particles()[0].astype(np.float64)
+        if len(weights) != self.particles or not abs(weights.sum() - 1) < 1e-3:
+            raise ValueError("state is damaged: its weights have no sum of 1")
+        if not 0 <= core.effective_size <= 1.001 * self.particles:
+            raise ValueError(f"state is damaged: its effective size is {core.effective_size}")
 
     @property
     def particles(self) -> int:

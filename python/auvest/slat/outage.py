@@ -100,6 +100,13 @@ class Outage(Steps):
             except _core.StatusError as error:
                 raise ValueError(f"the shared state is refused: {error}") from None
 
+    def _require_started(self, core: Any, counts: npt.NDArray[np.int64]) -> None:
+        if core.communication == "down":  # then the filter runs: its counts are behind two
+            super()._require_started(core, counts[2:])
+
+    def _has_slave(self, core: Any) -> bool:
+        return bool(core.communication != "never")
+
     def _slave(self) -> tuple[Floats, Floats]:
         if self._core_steps.communication == "never":
             self._status = Status.not_initialised

@@ -11,9 +11,13 @@ import numpy.typing as npt
 
 from auvest import _core
 from auvest._arguments import DType, as_dtype, as_integer, as_kind, as_number
+from auvest._build import lacks
 from auvest.slat._base import MASTER, ParticleSlatFilter
 from auvest.slat.models import Imm, Master, PiecewiseAcceleration, core_master
 from auvest.slat.results import SlatRun
+
+for _line in lacks():
+    warnings.warn(f"auvest was {_line}", RuntimeWarning, stacklevel=2)
 
 #: Particles that a filter takes at most: 0.5 kB each in float32.
 MAX_PARTICLES = 10_000_000

@@ -244,6 +244,40 @@ TEST_CASE_TEMPLATE("waypoints: arcs join the legs without a step in place or dir
   CHECK(std::fabs(travelled - length) < 0.3);
 }
 
+TEST_CASE_TEMPLATE("waypoints: what quiet periods form ahead is what a switch forms by itself",
+                   Scalar, float, double) {
+  // A right corner, one of 0.3 rad, none, and one of 1.9 rad to port; places on every leg and arc.
+  const auvest::Waypoint<Scalar> plan[] = {{3, 1},    {103, 2},  {101, 100},
+                                           {70, 195}, {39, 290}, {150, Scalar(280.5)}};
+  const Scalar places[][2] = {{50, 1},   {102, 7},  {101, 60}, {Scalar(100.5), Scalar(100.5)},
+                              {80, 160}, {50, 255}, {40, 288}, {100, 285}};
+  for (const double arc_m : {0.0, 12.0}) {
+    auto rare = plan_with<Scalar>(8, arc_m);
+    auto often = plan_with<Scalar>(8, arc_m);
+    REQUIRE(rare.start(plan, 6) == Status::kOk);
+    REQUIRE(often.start(plan, 6) == Status::kOk);
+    int legs_and_arcs = 0, before = -1;
+    for (const auto& place : places) {
+      PathPoint<Scalar> switching, quiet;
+      REQUIRE(rare.locate(place[0], place[1], switching) == Status::kOk);
+      for (int k = 0; k < 5; ++k) {
+        REQUIRE(often.locate(place[0], place[1], quiet) == Status::kOk);
+        CHECK(often.leg() == rare.leg());
+        CHECK(often.on_arc() == rare.on_arc());
+        CHECK(often.remaining_m() == rare.remaining_m());
+        CHECK(quiet.direction_rad == switching.direction_rad);
+        CHECK(quiet.along_m == switching.along_m);
+        CHECK(quiet.cross_m == switching.cross_m);
+        CHECK(quiet.curvature == switching.curvature);
+      }
+      const int now = 2 * rare.leg() + (rare.on_arc() ? 1 : 0);
+      legs_and_arcs += now != before ? 1 : 0;
+      before = now;
+    }
+    CHECK(legs_and_arcs == (arc_m > 0 ? 8 : 5));
+  }
+}
+
 TEST_CASE_TEMPLATE("waypoints: what is refused, which leg and why; the old plan goes on", Scalar,
                    float, double) {
   const auvest::Waypoint<Scalar> good[] = {{0, 0}, {100, 0}, {100, 40}};

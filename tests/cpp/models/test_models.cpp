@@ -661,7 +661,8 @@ TEST_CASE("range and bearing: the near field begins where the belief reaches the
   CHECK(innovation(1) == close_to(1.1 * std::sin(0.4), 1e-12));
 }
 
-TEST_CASE("range and bearing: covariance of the position form, by Monte Carlo") {
+TEST_CASE("range and bearing: covariance of the position form, by Monte Carlo" *
+          doctest::test_suite("statistics")) {
   // Mean square error of the form along and across the measured direction, over 4e5 draws, divided
   // by what R says there. Expected: along, sigma_r^2 + E r^2 (1 - cos v_b)^2 with 3/4 sigma_b^4 as
   // the leading term of the second factor; across, r^2 E sin^2 v_b against (E r_measured^2 +
@@ -857,7 +858,8 @@ TEST_CASE("range, bearing and elevation: where the near field begins") {
   CHECK(is_near({8, 0, 6}, 0.5, 10.1 * 10.1 / 25 - 1));
 }
 
-TEST_CASE("range, bearing and elevation: covariance of the position form, by Monte Carlo") {
+TEST_CASE("range, bearing and elevation: covariance of the position form, by Monte Carlo" *
+          doctest::test_suite("statistics")) {
   // Mean square error of the form over the positions that a given measurement may come from, along
   // n, m, b and k.
   struct Case {

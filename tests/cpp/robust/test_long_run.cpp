@@ -67,7 +67,8 @@ LongRun million(double p0) {
   return run;
 }
 
-TEST_CASE("robust EKF: P stays symmetric positive definite over a million float updates") {
+TEST_CASE("robust EKF: P stays symmetric positive definite over a million float updates" *
+          doctest::test_suite("statistics")) {
   for (const double p0 : {1e-6, 1.0, 1e6}) {
     CAPTURE(p0);
     const LongRun two = million<auvest::SpeedHeading<float>>(p0);

@@ -82,7 +82,8 @@ double rmse(double fraction, double outlier_sigma_m) {
   return sums.rmse();
 }
 
-TEST_CASE("cooperative: RMSE over contamination, within 10 % of the reference") {
+TEST_CASE("cooperative: RMSE over contamination, within 10 % of the reference" *
+          doctest::test_suite("statistics")) {
   // Reference: a prototype of the same case, other random numbers, 20 runs.
   struct Row {
     double fraction, outlier_sigma_m, ekf, igg, huber;
@@ -165,7 +166,8 @@ void check_consistency() {
   }
 }
 
-TEST_CASE("cooperative: NEES and NIS lie in their bounds, and outside with a wrong Q or R") {
+TEST_CASE("cooperative: NEES and NIS lie in their bounds, and outside with a wrong Q or R" *
+          doctest::test_suite("statistics")) {
   check_consistency<Ekf>();
   check_consistency<RobustEkf>();
 }

@@ -134,7 +134,8 @@ Spread fly_runs(const MissionScenario& scenario, int runs) {
   return spread;
 }
 
-TEST_CASE("mission with noise: each estimate within its statistics, over some runs") {
+TEST_CASE("mission with noise: each estimate within its statistics, over some runs" *
+          doctest::test_suite("statistics")) {
   // Mean and standard error of 50 runs of an independent prototype; here of 12 with other seeds.
   struct Case {
     MissionSource source;
@@ -187,7 +188,8 @@ double share_within(const std::vector<double>& sums, double low, double high) {
   return inside / static_cast<double>(sums.size());
 }
 
-TEST_CASE("mission: the model-aided filter knows how far off it is, where its model holds") {
+TEST_CASE("mission: the model-aided filter knows how far off it is, where its model holds" *
+          doctest::test_suite("statistics")) {
   // A compass without bias, a current that walks as the filter thinks, and the noise of the log in
   // q: 0.05 m/s at 10 Hz are 2.5e-4 m^2/s, the heading's noise adds 2e-5.
   MissionScenario s = mission_source(MissionSource::kModelAidedCrab, MissionTrack::kCircle);
@@ -241,20 +243,19 @@ TEST_CASE("mission: the default noise covers a compass that is off by a degree")
   CHECK(all / steps < 4.5);
 }
 
-TEST_CASE("mission: late fixes are taken at their own time by the model-aided filter") {
+TEST_CASE("mission: late fixes are taken at their own time") {
   // An answer that takes its time: valid at t + r/c, known at t + 2 r/c. Half a second more on top.
   MissionScenario s = mission_source(MissionSource::kModelAidedCrab, MissionTrack::kLawnmower, 1.0);
   const double at_once = fly_runs(s, 6).position;
   s.usbl.sound_m_s = 1500;
   s.usbl_timing.latency_s = 0.5;
-  const Spread late = fly_runs(s, 6);
-  CHECK(late.position < 1.15 * at_once);
-  // The UKF takes them as if they were fresh: behind by latency times speed.
-  MissionScenario stale = mission_source(MissionSource::kUkf, MissionTrack::kLawnmower, 1.0);
-  const double fresh = fly_runs(stale, 6).position;
-  stale.usbl.sound_m_s = 1500;
-  stale.usbl_timing.latency_s = 1.5;
-  CHECK(fly_runs(stale, 6).position > fresh + 0.3);
+  CHECK(fly_runs(s, 6).position < 1.15 * at_once);
+  // A UKF of constant acceleration has more to predict. But taken as fresh, a fix that is 1.5 s old
+  // would alone put it 1.5 m/s times 1.5 s behind.
+  s = mission_source(MissionSource::kUkf, MissionTrack::kLawnmower, 0.5);
+  s.usbl.sound_m_s = 1500;
+  s.usbl_timing.latency_s = 1.5;
+  CHECK(fly_runs(s, 6).position < 1.5 * 1.5);
 }
 
 TEST_CASE("mission: the interval policy decides when to ask") {

@@ -98,8 +98,9 @@ TEST_CASE("robustness: SLATF 2.0") { check_all<FloatSlatf2<1>>(); }
 TEST_CASE("robustness: SlatfJoint") { check_all<FloatJoint<1>>(); }
 TEST_CASE("robustness: EKF-SLAT") { check_all<FloatEkf<1>>(); }
 
-TEST_CASE_TEMPLATE("robustness: two masters cross and nobody says whose echo it is", Filter,
-                   FloatSlatf1<2>, FloatSlatf2<2>, FloatJoint<2>, FloatEkf<2>) {
+TEST_CASE_TEMPLATE("robustness: two masters cross and nobody says whose echo it is" *
+                       doctest::test_suite("statistics"),
+                   Filter, FloatSlatf1<2>, FloatSlatf2<2>, FloatJoint<2>, FloatEkf<2>) {
   // They meet within 20 m after 90 s; from then on a swapped pair would stay swapped.
   SlatScenario crossing;
   crossing.count = 2;

@@ -85,16 +85,19 @@ TEST_CASE("SLATF: one particle and a slave without noise is the EKF of the maste
 // ---- One update by brute force
 // -------------------------------------------------------------------
 
-TEST_CASE_TEMPLATE("SLATF: 1e5 particles are the posterior of a grid, after one echo and after two",
-                   Filter, auvest::Slatf1<Compass<double>, Master<double>, 1>,
-                   auvest::Slatf2<Compass<double>, Master<double>, 1>) {
+TEST_CASE_TEMPLATE(
+    "SLATF: 1e5 particles are the posterior of a grid, after one echo and after two" *
+        doctest::test_suite("statistics"),
+    Filter, auvest::Slatf1<Compass<double>, Master<double>, 1>,
+    auvest::Slatf2<Compass<double>, Master<double>, 1>) {
   FarApart problem;
   check_against_grid<Filter>(problem, typename Filter::Params());
   problem.hear(1, -0.001);  // its weight multiplies the one before
   check_against_grid<Filter>(problem, typename Filter::Params());
 }
 
-TEST_CASE("SLATF 2.0: the weight is the integral of Eq. (63), for measurements near and far off") {
+TEST_CASE("SLATF 2.0: the weight is the integral of Eq. (63), for measurements near and far off" *
+          doctest::test_suite("statistics")) {
   for (const double offset : {-6.0, -2.0, 0.0, 2.0}) {
     FarApart problem;
     problem.start.P.setZero();  // one particle: its pose before the step is known
@@ -107,8 +110,8 @@ TEST_CASE("SLATF 2.0: the weight is the integral of Eq. (63), for measurements n
   }
 }
 
-TEST_CASE(
-    "SLATF 2.0: the drawn pose has the mean and the covariance of the conditional posterior") {
+TEST_CASE("SLATF 2.0: the drawn pose has the mean and the covariance of the conditional posterior" *
+          doctest::test_suite("statistics")) {
   // With the pose before the step known, p(X | z) of Eqs. (57) and (58) is the grid's marginal.
   FarApart problem;
   problem.start.P.setZero();

@@ -180,7 +180,8 @@ TEST_CASE("SlatfJoint: a drift of all together is not drawn, nor is what is cert
 // ---- Posteriors
 // ----------------------------------------------------------------------------------
 
-TEST_CASE("SlatfJoint: 1e5 particles are the posterior of a grid, whatever they keep") {
+TEST_CASE("SlatfJoint: 1e5 particles are the posterior of a grid, whatever they keep" *
+          doctest::test_suite("statistics")) {
   for (const double kept : {0.0, 0.5}) {
     FarApart problem;
     auto params = paper<Joint<double, 1>::Params>();
@@ -191,7 +192,8 @@ TEST_CASE("SlatfJoint: 1e5 particles are the posterior of a grid, whatever they 
   }
 }
 
-TEST_CASE("SlatfJoint: where the sonar is linear the mixture is the Kalman filter, step by step") {
+TEST_CASE("SlatfJoint: where the sonar is linear the mixture is the Kalman filter, step by step" *
+          doctest::test_suite("statistics")) {
   // Masters 2 km away: the sonar is linear to 1e-3 of what it corrects. Draws, weights and
   // resampling over 12 pings of two masters must leave the moments of one Gaussian.
   using Filter = Joint<double, 2>;

@@ -39,20 +39,13 @@ class DepthControl : public IntegratingControl<Scalar_> {
   /// nothing has changed, the pitch neither.
   Status update(Scalar wanted_m, Scalar depth_m, Scalar dt, Scalar& pitch_rad) {
     Step step;
-    const Status status = propose(wanted_m, depth_m, dt, step);
-    if (status != Status::kOk) return status;
-    this->accept(step);
-    pitch_rad = step.command;
-    return Status::kOk;
+    return this->take(propose(wanted_m, depth_m, dt, step), step, pitch_rad);
   }
 
   /// The same step without taking it: accept(step) does.
   Status propose(Scalar wanted_m, Scalar depth_m, Scalar dt, Step& step) const {
-    if (this->check() != Status::kOk) return this->check();
-    if (!math::is_finite(wanted_m) || !math::is_finite(depth_m) || !math::is_finite(dt)) {
-      return Status::kNotFinite;
-    }
-    if (dt < Scalar(0)) return Status::kTimeBackwards;
+    const Status status = this->admit(dt, wanted_m, depth_m);
+    if (status != Status::kOk) return status;
     const Scalar error = depth_m - wanted_m;
     // [CONTROL 9]
     const Scalar wished = params_.proportional * error + params_.integral * this->integral();

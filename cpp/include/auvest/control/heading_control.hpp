@@ -15,22 +15,19 @@
 //     control.update(reference, heading, yaw_rate, 1.5f, 0.1f, rudder);
 #pragma once
 
-#include "auvest/control/integrating_control.hpp"
+#include "auvest/control/heading_controller.hpp"
 #include "auvest/control/reference.hpp"
 #include "auvest/control/steering.hpp"
-#include "auvest/math/angle.hpp"
 #include "auvest/math/basic.hpp"
-#include "auvest/status.hpp"
 
 namespace auvest {
 inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
-class HeadingControl : public IntegratingControl<Scalar_> {
+class HeadingControl : public HeadingController<HeadingControl<Scalar_>, Scalar_> {
  public:
   using Scalar = Scalar_;
-  using Base = IntegratingControl<Scalar>;
-  using typename Base::Step;
+  using Base = HeadingController<HeadingControl<Scalar_>, Scalar_>;
 
   struct Params : Steering<Scalar> {
     Scalar frequency_rad_s = Scalar(0.8);  ///< w, > 0
@@ -54,38 +51,14 @@ class HeadingControl : public IntegratingControl<Scalar_> {
     integral_gain_ = Scalar(0.1) * (w * w * w);
   }
 
-  /// The rudder [rad], positive for a positive yaw rate, from heading [rad], yaw rate [rad/s] and
-  /// speed through the water [m/s]. On anything but kOk nothing has changed, the rudder neither.
-  Status update(const Reference<Scalar>& wanted, Scalar heading_rad, Scalar rate_rad_s,
-                Scalar speed_m_s, Scalar dt, Scalar& rudder_rad) {
-    Step step;
-    const Status status = propose(wanted, heading_rad, rate_rad_s, speed_m_s, dt, step);
-    if (status != Status::kOk) return status;
-    this->accept(step);
-    rudder_rad = step.command;
-    return Status::kOk;
-  }
-
-  /// The same step without taking it: accept(step) does.
-  Status propose(const Reference<Scalar>& wanted, Scalar heading_rad, Scalar rate_rad_s,
-                 Scalar speed_m_s, Scalar dt, Step& step) const {
-    if (this->check() != Status::kOk) return this->check();
-    if (!math::is_finite(wanted.value) || !math::is_finite(wanted.rate) ||
-        !math::is_finite(wanted.acceleration) || !math::is_finite(heading_rad) ||
-        !math::is_finite(rate_rad_s) || !math::is_finite(speed_m_s) || !math::is_finite(dt)) {
-      return Status::kNotFinite;
-    }
-    if (dt < Scalar(0)) return Status::kTimeBackwards;
-    const Scalar error = math::wrap(heading_rad - wanted.value);
-    const Scalar slip = rate_rad_s - wanted.rate;
+  /// The rudder [rad] before its limit; see HeadingController.
+  Scalar wished(const Reference<Scalar>& wanted, Scalar error, Scalar slip,
+                Scalar speed_m_s) const {
     const Scalar acceleration = wanted.acceleration - rate_gain_ * slip - error_gain_ * error -
                                 integral_gain_ * this->integral();
     const Scalar rate = wanted.rate + params_.share * slip;
     // [CONTROL 5]
-    const Scalar wished =
-        (params_.time_constant_s * acceleration + rate) / params_.gain_at(speed_m_s);
-    return this->limit(wished, -params_.max_rudder_rad, params_.max_rudder_rad, error, false, dt,
-                       step);
+    return (params_.time_constant_s * acceleration + rate) / params_.gain_at(speed_m_s);
   }
 
   const Params& params() const { return params_; }

@@ -11,22 +11,19 @@
 //     (T s + 1 + K_d + K_s / phi_b) (s + l)^2.
 #pragma once
 
-#include "auvest/control/integrating_control.hpp"
+#include "auvest/control/heading_controller.hpp"
 #include "auvest/control/reference.hpp"
 #include "auvest/control/steering.hpp"
-#include "auvest/math/angle.hpp"
 #include "auvest/math/basic.hpp"
-#include "auvest/status.hpp"
 
 namespace auvest {
 inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar_>
-class HeadingSlidingMode : public IntegratingControl<Scalar_> {
+class HeadingSlidingMode : public HeadingController<HeadingSlidingMode<Scalar_>, Scalar_> {
  public:
   using Scalar = Scalar_;
-  using Base = IntegratingControl<Scalar>;
-  using typename Base::Step;
+  using Base = HeadingController<HeadingSlidingMode<Scalar_>, Scalar_>;
 
   struct Params : Steering<Scalar> {
     Scalar bandwidth_rad_s = Scalar(0.3);   ///< l, > 0
@@ -48,42 +45,20 @@ class HeadingSlidingMode : public IntegratingControl<Scalar_> {
   explicit HeadingSlidingMode(const Params& params = Params())
       : Base(valid(params)), params_(params) {}
 
-  /// As HeadingControl::update.
-  Status update(const Reference<Scalar>& wanted, Scalar heading_rad, Scalar rate_rad_s,
-                Scalar speed_m_s, Scalar dt, Scalar& rudder_rad) {
-    Step step;
-    const Status status = propose(wanted, heading_rad, rate_rad_s, speed_m_s, dt, step);
-    if (status != Status::kOk) return status;
-    this->accept(step);
-    rudder_rad = step.command;
-    return Status::kOk;
-  }
-
-  /// The same step without taking it: accept(step) does.
-  Status propose(const Reference<Scalar>& wanted, Scalar heading_rad, Scalar rate_rad_s,
-                 Scalar speed_m_s, Scalar dt, Step& step) const {
-    if (this->check() != Status::kOk) return this->check();
-    if (!math::is_finite(wanted.value) || !math::is_finite(wanted.rate) ||
-        !math::is_finite(wanted.acceleration) || !math::is_finite(heading_rad) ||
-        !math::is_finite(rate_rad_s) || !math::is_finite(speed_m_s) || !math::is_finite(dt)) {
-      return Status::kNotFinite;
-    }
-    if (dt < Scalar(0)) return Status::kTimeBackwards;
+  /// The rudder [rad] before its limit; see HeadingController.
+  Scalar wished(const Reference<Scalar>& wanted, Scalar error, Scalar slip,
+                Scalar speed_m_s) const {
     const Scalar one = Scalar(1);
     const Scalar l = params_.bandwidth_rad_s;
-    const Scalar error = math::wrap(heading_rad - wanted.value);
-    const Scalar slip = rate_rad_s - wanted.rate;
     const Scalar pull = Scalar(2) * l * error + l * l * this->integral();
     const Scalar surface = slip + pull;  // [CONTROL 6]
     const Scalar rate = wanted.rate - pull;
     const Scalar acceleration = wanted.acceleration - Scalar(2) * l * slip - l * l * error;
     const Scalar layer = math::clamp(surface / params_.boundary_rad_s, -one, one);
     // [CONTROL 7]
-    const Scalar wished = (params_.time_constant_s * acceleration + rate -
-                           params_.damping * surface - params_.switching_rad_s * layer) /
-                          params_.gain_at(speed_m_s);
-    return this->limit(wished, -params_.max_rudder_rad, params_.max_rudder_rad, error, false, dt,
-                       step);
+    return (params_.time_constant_s * acceleration + rate - params_.damping * surface -
+            params_.switching_rad_s * layer) /
+           params_.gain_at(speed_m_s);
   }
 
   const Params& params() const { return params_; }

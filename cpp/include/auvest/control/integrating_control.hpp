@@ -4,9 +4,9 @@
 //
 //     I <- I + dt error   unless the error asks for more of what is cut off.
 //
-// Such a controller offers propose(..., step), which computes a step and changes nothing, and
-// update(..., command), which also takes it: so several controllers can step together or not at
-// all.
+// Such a controller offers propose(..., step), which computes a step and changes nothing that is
+// seen, and update(..., command), which also takes it: so several controllers can step together or
+// not at all.
 #pragma once
 
 #include "auvest/math/basic.hpp"
@@ -54,6 +54,22 @@ class IntegratingControl {
         saturated_(false),
         integral_(Scalar(0)) {}
 
+  /// kOk where the parameters are valid, each of these values is finite, and time goes on.
+  template <class... Values>
+  Status admit(Scalar dt, Values... values) const {
+    if (check_ != Status::kOk) return check_;
+    if (!all_finite(dt, values...)) return Status::kNotFinite;
+    return dt < Scalar(0) ? Status::kTimeBackwards : Status::kOk;
+  }
+
+  /// Takes a step that was proposed with this status, if that is kOk.
+  Status take(Status proposed, const Step& step, Scalar& command) {
+    if (proposed != Status::kOk) return proposed;
+    accept(step);
+    command = step.command;
+    return Status::kOk;
+  }
+
   /// The step that gives `wished` within its limits. `raises`: a positive error raises the command.
   Status limit(Scalar wished, Scalar low, Scalar high, Scalar error, bool raises, Scalar dt,
                Step& step) const {
@@ -68,6 +84,12 @@ class IntegratingControl {
   }
 
  private:
+  static bool all_finite() { return true; }
+  template <class... Others>
+  static bool all_finite(Scalar first, Others... others) {
+    return math::is_finite(first) && all_finite(others...);
+  }
+
   Status check_;
   bool saturated_;
   Scalar integral_;

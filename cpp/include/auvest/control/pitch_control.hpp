@@ -43,22 +43,14 @@ class PitchControl : public IntegratingControl<Scalar_> {
   Status update(Scalar wanted_rad, Scalar pitch_rad, Scalar rate_rad_s, Scalar dt,
                 Scalar& plane_rad) {
     Step step;
-    const Status status = propose(wanted_rad, pitch_rad, rate_rad_s, dt, step);
-    if (status != Status::kOk) return status;
-    this->accept(step);
-    plane_rad = step.command;
-    return Status::kOk;
+    return this->take(propose(wanted_rad, pitch_rad, rate_rad_s, dt, step), step, plane_rad);
   }
 
   /// The same step without taking it: accept(step) does.
   Status propose(Scalar wanted_rad, Scalar pitch_rad, Scalar rate_rad_s, Scalar dt,
                  Step& step) const {
-    if (this->check() != Status::kOk) return this->check();
-    if (!math::is_finite(wanted_rad) || !math::is_finite(pitch_rad) ||
-        !math::is_finite(rate_rad_s) || !math::is_finite(dt)) {
-      return Status::kNotFinite;
-    }
-    if (dt < Scalar(0)) return Status::kTimeBackwards;
+    const Status status = this->admit(dt, wanted_rad, pitch_rad, rate_rad_s);
+    if (status != Status::kOk) return status;
     const Scalar error = math::wrap(pitch_rad - wanted_rad);
     // [CONTROL 10]
     const Scalar wished = params_.proportional * error + params_.derivative * rate_rad_s +

@@ -36,30 +36,28 @@ class SpeedControl : public IntegratingControl<Scalar_> {
     }
   };
 
-  explicit SpeedControl(const Params& params = Params()) : Base(valid(params)), params_(params) {}
+  explicit SpeedControl(const Params& params = Params())
+      : Base(valid(params)), params_(params), wanted_(Scalar(0)), feed_(Scalar(0)) {}
 
   /// Revolutions per second for the wanted speed from the measured one, both through the water
   /// [m/s]. On anything but kOk nothing has changed, the command neither.
   Status update(Scalar wanted_m_s, Scalar speed_m_s, Scalar dt, Scalar& rev_s) {
     Step step;
-    const Status status = propose(wanted_m_s, speed_m_s, dt, step);
-    if (status != Status::kOk) return status;
-    this->accept(step);
-    rev_s = step.command;
-    return Status::kOk;
+    return this->take(propose(wanted_m_s, speed_m_s, dt, step), step, rev_s);
   }
 
   /// The same step without taking it: accept(step) does.
-  Status propose(Scalar wanted_m_s, Scalar speed_m_s, Scalar dt, Step& step) const {
-    if (this->check() != Status::kOk) return this->check();
-    if (!math::is_finite(wanted_m_s) || !math::is_finite(speed_m_s) || !math::is_finite(dt)) {
-      return Status::kNotFinite;
-    }
-    if (dt < Scalar(0)) return Status::kTimeBackwards;
+  Status propose(Scalar wanted_m_s, Scalar speed_m_s, Scalar dt, Step& step) {
+    const Status status = this->admit(dt, wanted_m_s, speed_m_s);
+    if (status != Status::kOk) return status;
     const Scalar error = wanted_m_s - speed_m_s;
+    if (wanted_m_s != wanted_) {
+      feed_ = wanted_m_s / params_.advance_m;
+      wanted_ = wanted_m_s;
+    }
     // [CONTROL 8]
-    const Scalar wished = wanted_m_s / params_.advance_m + params_.proportional * error +
-                          params_.integral * this->integral();
+    const Scalar wished =
+        feed_ + params_.proportional * error + params_.integral * this->integral();
     return this->limit(wished, Scalar(0), params_.max_rev_s, error, true, dt, step);
   }
 
@@ -72,6 +70,8 @@ class SpeedControl : public IntegratingControl<Scalar_> {
   }
 
   Params params_;
+  Scalar wanted_;  // for which
+  Scalar feed_;    // is U / c: it rarely changes, and a chip divides slowly
 };
 
 }  // namespace AUVEST_INSTRUCTIONS

@@ -30,7 +30,8 @@ class Circle {
         curvature_(Scalar(1)),
         radius_(Scalar(1)),
         start_(math::half_pi<Scalar>()),
-        length_(math::two_pi<Scalar>()) {}
+        length_(math::two_pi<Scalar>()),
+        half_turn_(half_turn()) {}
 
   /// The circle about (x, y) [m] whose radius [m] is positive clockwise and negative anticlockwise.
   /// Its beginning is at its north. kNotFinite, or kBadParameter for a radius of 0; the circle is
@@ -69,8 +70,8 @@ class Circle {
     point.cross_m = anticlockwise ? distance - radius_ : radius_ - distance;
     point.curvature = curvature_;
     const Scalar turned = point.direction_rad - start_;
-    const Scalar half = Scalar(0.5) * length_ / radius_;
-    point.along_m = radius_ * (half + math::wrap((anticlockwise ? -turned : turned) - half));
+    const Scalar ahead = anticlockwise ? -turned : turned;
+    point.along_m = radius_ * (half_turn_ + math::wrap(ahead - half_turn_));
     return point;
   }
 
@@ -94,14 +95,18 @@ class Circle {
     radius_ = radius;
     start_ = start_rad;
     length_ = radius * turn_rad;
+    half_turn_ = half_turn();
     return Status::kOk;
   }
+
+  Scalar half_turn() const { return Scalar(0.5) * length_ / radius_; }
 
   Scalar x_, y_;      // of the centre
   Scalar curvature_;  // signed
   Scalar radius_;
   Scalar start_;  // direction where it begins
   Scalar length_;
+  Scalar half_turn_;  // from its beginning to its middle [rad]
 };
 
 }  // namespace AUVEST_INSTRUCTIONS

@@ -48,6 +48,23 @@ class Line {
     return Status::kOk;
   }
 
+  /// The line that leaves (x, y) [m] in the direction with this sine and cosine and is so long [m].
+  /// kNotFinite, or kBadParameter for a length that is not positive; the line is then what it was.
+  Status leave(Scalar x, Scalar y, Scalar sine, Scalar cosine, Scalar length_m) {
+    if (!math::is_finite(x) || !math::is_finite(y) || !math::is_finite(sine) ||
+        !math::is_finite(cosine) || !math::is_finite(length_m)) {
+      return Status::kNotFinite;
+    }
+    if (!math::is_positive(length_m)) return Status::kBadParameter;
+    x_ = x;
+    y_ = y;
+    sine_ = sine;
+    cosine_ = cosine;
+    direction_ = math::atan2(sine, cosine);
+    length_ = length_m;
+    return Status::kOk;
+  }
+
   /// The point beside a vehicle at (x, y) [m].
   PathPoint<Scalar> locate(Scalar x, Scalar y) const {
     const Scalar dx = x - x_;

@@ -6,6 +6,9 @@
 //
 //     len - s < lead,   lead = R tan(|turn| / 2) = R |sin turn| / (1 + cos turn).
 //
+// What the switch to the next leg takes (its direction, its arc) is formed in periods that do not
+// switch, one thing in each: no period has all of it to do.
+//
 // After the last waypoint the plan holds the line of its last leg, or turns on a circle that begins
 // where the leg ends (end_radius_m). Both are there for as long as locate() is asked.
 //
@@ -21,6 +24,7 @@
 #include "auvest/guidance/circle.hpp"
 #include "auvest/guidance/line.hpp"
 #include "auvest/guidance/path_point.hpp"
+#include "auvest/guidance/plan_report.hpp"
 #include "auvest/math/basic.hpp"
 #include "auvest/math/trigonometry.hpp"
 #include "auvest/status.hpp"
@@ -32,47 +36,6 @@ inline namespace AUVEST_INSTRUCTIONS {
 template <class Scalar>
 struct Waypoint {
   Scalar x_m, y_m;
-};
-
-/// What is wrong with a plan, or deserves a warning.
-enum class PlanProblem : std::uint8_t {
-  kNone,
-  kTooFew,     ///< refused: fewer than two waypoints
-  kNotFinite,  ///< refused: a waypoint is NaN or infinite
-  kTooClose,   ///< refused: two waypoints coincide, or lie within switch_m
-  kNoRoom,     ///< refused: the leg is too short for the arcs at its ends
-  kTightLeg    ///< warned of: the leg, or an arc, is shorter than the hull's turning circle allows
-};
-
-/// One line of English for each, without a full stop.
-inline const char* describe(PlanProblem problem) {
-  switch (problem) {
-    case PlanProblem::kNone:
-      return "the plan can be flown";
-    case PlanProblem::kTooFew:
-      return "a plan needs at least two waypoints";
-    case PlanProblem::kNotFinite:
-      return "a waypoint is NaN or infinite";
-    case PlanProblem::kTooClose:
-      return "two waypoints coincide or are closer than the switching distance";
-    case PlanProblem::kNoRoom:
-      return "a leg is too short for the arcs at its ends";
-    case PlanProblem::kTightLeg:
-      return "a leg or an arc is shorter than the hull's turning circle";
-  }
-  return "unknown problem";
-}
-
-/// The first refusal, or else the first warning, and the leg (from 0) that has it.
-struct PlanReport {
-  PlanProblem problem;
-  std::uint16_t leg;
-
-  /// kOk for a plan that can be used, warnings included.
-  Status status() const {
-    if (problem == PlanProblem::kNone || problem == PlanProblem::kTightLeg) return Status::kOk;
-    return problem == PlanProblem::kNotFinite ? Status::kNotFinite : Status::kBadParameter;
-  }
 };
 
 template <class Scalar_>
@@ -107,7 +70,8 @@ class Waypoints {
         points_(nullptr),
         count_(0),
         leg_(0),
-        where_(Where::kLeg) {
+        where_(Where::kLeg),
+        formed_(Formed::kAll) {
     report_.problem = PlanProblem::kTooFew;
     report_.leg = 0;
   }
@@ -160,6 +124,8 @@ class Waypoints {
     if (report_.status() != Status::kOk) return report_.status();
     points_ = points;
     count_ = count;
+    aim(line_, points_, 0);
+    take_line(0);
     begin_leg(0);
     return Status::kOk;
   }
@@ -173,13 +139,18 @@ class Waypoints {
     if (!math::is_finite(found.along_m) || !math::is_finite(found.cross_m)) {
       return Status::kOverflow;
     }
-    while (due(found)) {
-      advance();
-      found = here(x, y);
+    remaining_ = length() - found.along_m;
+    if (!due()) {
+      form_ahead();
+    } else {
+      do {
+        advance();
+        found = here(x, y);
+        remaining_ = length() - found.along_m;
+      } while (due());
     }
+    if (circling()) remaining_ = Scalar(0);
     point = found;
-    const bool circling = finished() && params_.end_radius_m != Scalar(0);
-    remaining_ = circling ? Scalar(0) : length() - found.along_m;
     return Status::kOk;
   }
 
@@ -225,55 +196,95 @@ class Waypoints {
 
   bool last() const { return leg_ + 2 == count_; }
 
+  bool circling() const { return where_ == Where::kEnd && params_.end_radius_m != Scalar(0); }
+
   PathPoint<Scalar> here(Scalar x, Scalar y) const {
-    const bool turning =
-        where_ == Where::kArc || (where_ == Where::kEnd && params_.end_radius_m != Scalar(0));
-    return turning ? arc_.locate(x, y) : line_.locate(x, y);
+    return where_ == Where::kArc || circling() ? arc_.locate(x, y) : line_.locate(x, y);
   }
 
   Scalar length() const { return where_ == Where::kArc ? arc_.length_m() : line_.length_m(); }
 
-  bool due(const PathPoint<Scalar>& point) const {
+  bool due() const {
     if (where_ == Where::kEnd) return false;
-    const Scalar remaining = length() - point.along_m;
-    return !(remaining > Scalar(0)) || (where_ == Where::kLeg && remaining < lead_);  // [GUIDE 3]
+    return !(remaining_ > Scalar(0)) || (where_ == Where::kLeg && remaining_ < lead_);  // [GUIDE 3]
   }
 
+  // Of the end of `line_`, what is there, in this order. The line on an arc is already that of the
+  // leg behind it.
+  enum class Formed : std::uint8_t { kLine, kNext, kCorner, kAll };
+
+  std::uint16_t leg_of_line() const {
+    return static_cast<std::uint16_t>(where_ == Where::kArc ? leg_ + 1 : leg_);
+  }
+  bool arcs() const { return params_.arc_m > Scalar(0); }
+
+  /// Forms the next thing of the end of the line; its arc not before that is free.
+  void form() {
+    switch (formed_) {
+      case Formed::kLine:
+        aim(next_, points_, static_cast<std::uint16_t>(leg_of_line() + 1));
+        formed_ = arcs() ? Formed::kNext : Formed::kAll;
+        return;
+      case Formed::kNext: {
+        const Corner corner = corner_between(line_, next_);
+        turn_ = corner.turn;
+        lead_ = corner.lead;
+        formed_ = turn_ != Scalar(0) ? Formed::kCorner : Formed::kAll;
+        return;
+      }
+      case Formed::kCorner: {
+        const Point& corner = points_[leg_ + 1];
+        const bool anticlockwise = turn_ < Scalar(0);
+        const Status status =
+            arc_.leave(corner.x_m - lead_ * line_.cosine(), corner.y_m - lead_ * line_.sine(),
+                       line_.sine(), line_.cosine(), anticlockwise ? -params_.arc_m : params_.arc_m,
+                       anticlockwise ? -turn_ : turn_);
+        if (status != Status::kOk) turn_ = Scalar(0);  // too far out for an arc in this precision
+        formed_ = Formed::kAll;
+        return;
+      }
+      case Formed::kAll:
+        return;
+    }
+  }
+  void form_ahead() {
+    if (formed_ != Formed::kCorner || where_ == Where::kLeg) form();
+  }
+  void form_up_to(Formed wanted) {
+    while (formed_ < wanted) form();
+  }
+
+  /// `line_` is now this leg's, and nothing of its end is there.
+  void take_line(std::uint16_t leg) {
+    const bool last = leg + 2 == count_;
+    turn_ = Scalar(0);
+    lead_ = last ? Scalar(0) : params_.switch_m;
+    formed_ = last ? Formed::kAll : Formed::kLine;
+  }
   void begin_leg(std::uint16_t leg) {
     leg_ = leg;
     where_ = Where::kLeg;
-    aim(line_, points_, leg);
     remaining_ = line_.length_m();
-    turn_ = lead_ = Scalar(0);
-    if (last()) return;
-    lead_ = params_.switch_m;
-    if (!(params_.arc_m > Scalar(0))) return;
-    Line<Scalar> next;
-    aim(next, points_, static_cast<std::uint16_t>(leg + 1));
-    const Corner corner = corner_between(line_, next);
-    turn_ = corner.turn;
-    lead_ = corner.lead;
+    if (arcs()) form_up_to(Formed::kCorner);
   }
 
   void advance() {
-    const Point& corner = points_[leg_ + 1];
-    if (where_ == Where::kLeg && last()) {
+    const std::uint16_t next = static_cast<std::uint16_t>(leg_ + 1);
+    if (where_ == Where::kArc) return begin_leg(next);
+    if (last()) {
       where_ = Where::kEnd;
-      if (params_.end_radius_m != Scalar(0)) {
-        arc_.leave(corner.x_m, corner.y_m, line_.sine(), line_.cosine(), params_.end_radius_m,
-                   math::two_pi<Scalar>());
+      if (circling()) {
+        arc_.leave(points_[next].x_m, points_[next].y_m, line_.sine(), line_.cosine(),
+                   params_.end_radius_m, math::two_pi<Scalar>());
       }
       return;
     }
-    const bool rounded = where_ == Where::kLeg && turn_ != Scalar(0);
-    if (rounded &&
-        arc_.leave(corner.x_m - lead_ * line_.cosine(), corner.y_m - lead_ * line_.sine(),
-                   line_.sine(), line_.cosine(), turn_ < Scalar(0) ? -params_.arc_m : params_.arc_m,
-                   turn_ < Scalar(0) ? -turn_ : turn_) == Status::kOk) {
-      where_ = Where::kArc;
-      return;
-    }
-    begin_leg(static_cast<std::uint16_t>(leg_ + 1));
+    form_up_to(Formed::kAll);
+    const bool rounded = turn_ != Scalar(0);
+    line_ = next_;
+    take_line(next);
+    if (!rounded) return begin_leg(next);
+    where_ = Where::kArc;
   }
 
   Params params_;
@@ -282,8 +293,9 @@ class Waypoints {
   std::uint16_t count_;
   std::uint16_t leg_;
   Where where_;
+  Formed formed_;
   PlanReport report_;
-  Line<Scalar> line_;
+  Line<Scalar> line_, next_;
   Circle<Scalar> arc_;
   Scalar lead_ = Scalar(0);
   Scalar turn_ = Scalar(0);

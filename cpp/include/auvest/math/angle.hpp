@@ -23,14 +23,16 @@ namespace math {
 AUVEST_OUTLINE AUVEST_INLINE float wrap(float a) {
   const float size = absolute(a);
   if (!is_finite(a)) return quiet_nan();
+  // Compared by their bits: an 8-bit chip is quicker at that.
+  const uint32_t half_turn = 0x40490fdbu;  // pi
   float wrapped = a;
-  if (size > pi<float>()) {
+  if (to_bits(size) > half_turn) {
     // Up to 3 pi exact, then one rounding: 2 pi = 6.28318548 - 1.74845553e-07.
     wrapped = size <= 9.424777f ? (size - 6.28318548f) + 1.74845553e-07f
                                 : detail::turn_to_radian(detail::fraction_of_turn(size));
     if ((to_bits(a) & 0x80000000u) != 0) wrapped = -wrapped;
   }
-  return absolute(wrapped) == pi<float>() ? pi<float>() : wrapped;
+  return to_bits(absolute(wrapped)) == half_turn ? pi<float>() : wrapped;
 }
 
 namespace detail {

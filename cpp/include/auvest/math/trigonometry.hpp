@@ -140,10 +140,10 @@ AUVEST_INLINE Value reduce_near(const Value& x, Value& shifted) {
 template <class Value>
 AUVEST_INLINE Value paired_polynomial(const float* c, int count, Value u) {
   const Value v = u * u;
-  c += count;
-  Value p = Value(0.0f);
+  c += count - 2;
+  Value p = Value(c[0]) + u * Value(c[1]);
   AUVEST_UNROLL
-  for (int i = 0; i < count; i += 2) {
+  for (int i = 2; i < count; i += 2) {
     c -= 2;
     const Value pair = Value(c[0]) + u * Value(c[1]);
     p = pair + v * p;

@@ -128,7 +128,11 @@ class Pilot {
         path_(params.waypoints),
         law_(params.guidance),
         heading_filter_(params.heading),
-        autopilot_(params.autopilot) {}
+        autopilot_(params.autopilot),
+        hold_s_(silence(params.hold_s)),
+        compass_s_(silence(params.compass_s)),
+        lost_m2_(params.lost_m * params.lost_m),
+        stride_m_(params.speed_m_s * params.period_s) {}
 
   /// The first part that refuses its parameters, or kOk.
   Status check() const {
@@ -163,8 +167,8 @@ class Pilot {
     for (Scalar& silence : silent_s_) silence = Scalar(0);
     period_ = asked_ = 0;
     next_ = periods_of(interval());
-    desired_leg_ = 0;
     desired_m_ = Scalar(0);
+    begin_desired_leg(0);
     return Status::kOk;
   }
 
@@ -279,9 +283,8 @@ class Pilot {
     if (heard) now_.heard = static_cast<std::uint8_t>(now_.heard | (1 << sensor));
     return heard;
   }
-  bool silent(int sensor, Scalar longest) const {
-    return silent_s_[sensor] > longest + Scalar(0.5) * params_.period_s;  // sums of dt round
-  }
+  /// The silence that is longer than this one: sums of dt round.
+  Scalar silence(Scalar longest_s) const { return longest_s + Scalar(0.5) * params_.period_s; }
 
   void accept(const Readings& r, Scalar dt) {
     const Params& p = params_;
@@ -312,7 +315,7 @@ class Pilot {
     if (note(2, log, dt)) {
       now_.speed_m_s = r.speed_m_s;
       now_.sway_m_s = r.sway_m_s;
-    } else if (silent(2, p.hold_s)) {
+    } else if (silent_s_[2] > hold_s_) {
       now_.speed_m_s = mode_ == PilotMode::kUnderWay ? p.speed_m_s : Scalar(0);
       now_.sway_m_s = Scalar(0);
     }
@@ -333,11 +336,11 @@ class Pilot {
     const std::uint8_t needed = kCompassHeard | kGyroHeard | kDepthHeard;
     if (mode_ == PilotMode::kFinished) return mode_;
     if ((now_.heard & needed) != needed) return PilotMode::kWaiting;
-    if (silent(0, params_.compass_s) || silent(1, params_.hold_s) || silent(3, params_.hold_s)) {
+    if (silent_s_[0] > compass_s_ || silent_s_[1] > hold_s_ || silent_s_[3] > hold_s_) {
       return PilotMode::kSilent;
     }
     const auto& P = filter_.belief().P;
-    const bool known = P(0, 0) + P(1, 1) < params_.lost_m * params_.lost_m;
+    const bool known = P(0, 0) + P(1, 1) < lost_m2_;
     return known ? PilotMode::kUnderWay : PilotMode::kLost;
   }
 
@@ -353,25 +356,24 @@ class Pilot {
 
   /// The desired point goes on along the plan, and along its last leg beyond it.
   void advance_desired() {
-    desired_m_ = desired_m_ + params_.speed_m_s * params_.period_s;
-    for (;;) {
-      const Scalar length = Scalar(math::sqrt(square_of_leg()));
-      if (!(desired_m_ > length) || desired_leg_ + 2 >= count_) return;
-      desired_m_ = desired_m_ - length;
-      ++desired_leg_;
+    desired_m_ = desired_m_ + stride_m_;
+    while (desired_m_ > desired_length_m_ && desired_leg_ + 2 < count_) {
+      desired_m_ = desired_m_ - desired_length_m_;
+      begin_desired_leg(static_cast<std::uint16_t>(desired_leg_ + 1));
     }
   }
-  Scalar square_of_leg() const {
-    const Waypoint<Scalar>& from = plan_[desired_leg_];
-    const Waypoint<Scalar>& to = plan_[desired_leg_ + 1];
+  void begin_desired_leg(std::uint16_t leg) {
+    const Waypoint<Scalar>& from = plan_[leg];
+    const Waypoint<Scalar>& to = plan_[leg + 1];
     const Scalar dx = to.x_m - from.x_m;
     const Scalar dy = to.y_m - from.y_m;
-    return dx * dx + dy * dy;
+    desired_leg_ = leg;
+    desired_length_m_ = math::sqrt(dx * dx + dy * dy);
   }
   typename Filter::Position desired() const {
     const Waypoint<Scalar>& from = plan_[desired_leg_];
     const Waypoint<Scalar>& to = plan_[desired_leg_ + 1];
-    const Scalar share = desired_m_ / math::sqrt(square_of_leg());
+    const Scalar share = desired_m_ / desired_length_m_;
     typename Filter::Position point;
     point(0) = from.x_m + (to.x_m - from.x_m) * share;
     point(1) = from.y_m + (to.y_m - from.y_m) * share;
@@ -386,6 +388,8 @@ class Pilot {
   CrabFeedForward<Scalar> law_;
   HeadingFilter<Scalar> heading_filter_;
   Autopilot<Scalar> autopilot_;
+  // Formed once, as a period has little time.
+  Scalar hold_s_, compass_s_, lost_m2_, stride_m_;
   const Waypoint<Scalar>* plan_ = nullptr;
   std::uint16_t count_ = 0;
   Readings now_;  // `heard`: of all periods so far
@@ -395,6 +399,7 @@ class Pilot {
   std::uint32_t implausible_ = 0;
   Scalar cross_m_ = Scalar(0);
   std::uint16_t desired_leg_ = 0;
+  Scalar desired_length_m_ = Scalar(0);
   Scalar desired_m_ = Scalar(0);  // from the beginning of its leg
 };
 

@@ -68,16 +68,6 @@ struct ConstantAcceleration : ProcessModel<ConstantAcceleration<Scalar_, Order>,
     return phi;
   }
 
-  Covariance Q(Scalar dt) const {
-    Covariance q;
-    for (int i = 0; i < 6; ++i) {
-      for (int j = 0; j < 6; ++j) q(i, j) = Scalar(0);
-    }
-    add_noise(q, dt);
-    math::mirror_lower(q);
-    return q;
-  }
-
   /// x <- Phi x, P <- Phi P Phi' + Q in place. Row by row, every element is formed from elements
   /// further down or to the right, which still hold their old values. The upper triangle has no
   /// meaning afterwards.
@@ -119,6 +109,7 @@ struct ConstantAcceleration : ProcessModel<ConstantAcceleration<Scalar_, Order>,
   }
 
  private:
+  friend Base;
   struct Coefficients {
     Scalar first;   // dt
     Scalar second;  // dt^2 / 2

@@ -42,14 +42,6 @@ struct ConstantVelocity : ProcessModel<ConstantVelocity<Scalar_>, Scalar_, 6> {
     return phi;
   }
 
-  Covariance Q(Scalar dt) const {
-    Covariance q;
-    math::set_zero(q);
-    add_noise(q, dt);
-    math::mirror_lower(q);
-    return q;
-  }
-
   /// x <- Phi x, P <- Phi P Phi' + Q in place: row by row, from elements that are still old.
   template <class Value>
   AUVEST_INLINE void propagate(Belief<Value, 6>& belief, Scalar dt) const {
@@ -75,6 +67,7 @@ struct ConstantVelocity : ProcessModel<ConstantVelocity<Scalar_>, Scalar_, 6> {
   }
 
  private:
+  friend Base;
   using Motion = WhiteAcceleration<Scalar, 2>;
 
   /// What is left of the acceleration: nothing, but all of it where no time passes.

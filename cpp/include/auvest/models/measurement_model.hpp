@@ -7,7 +7,8 @@
 //     Vector<Scalar, M>           h(x)   the measurement without noise
 //     Matrix<Scalar, M, M>        R()    covariance of its noise
 //     Matrix<Scalar, M, Observed> H(x)   Jacobian of h (EKF only)
-//     Status                      check()  kOk, or kBadParameter if a parameter is out of range;
+//     Status                      check()  kOk, kBadParameter if a parameter is out of range, or
+//                                          kFarFromOrigin if a coordinate is (resolution.hpp);
 //                                          for who builds the model, once: an update does not ask
 //
 // It may override
@@ -15,6 +16,7 @@
 //     residual(z, predicted)      z - predicted, wrapped where a component is an angle
 //     about(x)                    an expansion with deviations in closed form
 //     kClosedForm                 true if it does
+//     admits(z)                   kOk, or why the sensor cannot have measured these finite numbers
 //     second_order(point, root, innovation, noise)
 //                                 for the EKF: takes the mean of the second-order term of h, over
 //                                 the belief with P_oo = root root', off the innovation and adds
@@ -22,6 +24,8 @@
 //     kPlace, place(p)            how many numbers come with each measurement and are no part of it
 //                                 (where a station or a leader stood, how an instrument was
 //                                 headed), and their setter: for records in which they change
+//     kCircle, centre(p)          true where the measurement is the distance of the first two
+//                                 states from a point (p[0], p[1]), and that point: for GaussianSum
 //     near_field(point, P, z, innovation, noise)
 //                                 for a model with M = Observed: true where h is useless at the
 //                                 scale of the belief; the filter then takes the measurement as one
@@ -50,6 +54,7 @@ struct MeasurementModel {
   static constexpr int kObserved = Observed;
   static constexpr bool kClosedForm = false;
   static constexpr int kPlace = 0;
+  static constexpr bool kCircle = false;
 
   /// h about x, with deviations by subtraction (wrapped by `residual`).
   struct NumericExpansion {
@@ -83,6 +88,8 @@ struct MeasurementModel {
   }
 
   void place(const Scalar*) {}
+
+  Status admits(const Measurement&) const { return Status::kOk; }
 
   Measurement residual(const Measurement& z, const Measurement& predicted) const {
     Measurement difference;

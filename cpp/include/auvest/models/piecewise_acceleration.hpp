@@ -36,14 +36,6 @@ struct PiecewiseAcceleration : ProcessModel<PiecewiseAcceleration<Scalar_>, Scal
   State f(const State& x, Scalar dt) const { return noiseless().f(x, dt); }  // [SLATF 4]
   Covariance Phi(const State& x, Scalar dt) const { return noiseless().Phi(x, dt); }
 
-  Covariance Q(Scalar dt) const {
-    Covariance q;
-    math::set_zero(q);
-    add_noise(q, dt);
-    math::mirror_lower(q);
-    return q;
-  }
-
   /// Without u: x <- Phi x, P <- Phi P Phi' + G q^2 G' in place.
   template <class Value>
   AUVEST_INLINE void propagate(Belief<Value, 6>& belief, Scalar dt) const {
@@ -59,6 +51,7 @@ struct PiecewiseAcceleration : ProcessModel<PiecewiseAcceleration<Scalar_>, Scal
   }
 
  private:
+  friend Base;
   static AUVEST_INLINE ExactAcceleration<Scalar> noiseless() {
     AccelerationNoise<Scalar> none;
     none.position = none.velocity = none.acceleration = Scalar(0);

@@ -3,7 +3,8 @@
 // A process model is a plain struct. It derives from ProcessModel<Itself, Scalar, N> and offers
 //
 //     Vector<Scalar, N>    f(x, dt)    the state after dt seconds without noise
-//     Matrix<Scalar, N, N> Q(dt)       covariance of the process noise of those dt seconds
+//     Matrix<Scalar, N, N> Q(dt)       covariance of the process noise of those dt seconds; or
+//                                      add_noise(P, dt), which adds it to a lower triangle
 //     Matrix<Scalar, N, N> Phi(x, dt)  Jacobian of f with respect to x (EKF only)
 //     Status               check()     kOk, or kBadParameter if a parameter is out of range
 //
@@ -14,6 +15,7 @@
 //     kClosedForm            true if it does
 //     propagate(belief, dt)  x <- f, P <- Phi P Phi' + Q in place, from the structure of Phi
 //     kLinear                true if f is linear in x: the UKF then calls propagate, which is exact
+//     kTranslation           true if f moves every state by the same, and Q does not depend on x
 //     Input, input           type and value of what drives the process (a Vector), for
 //                            predict(dt, input)
 //     position_variance(belief, dt)
@@ -35,6 +37,7 @@ struct ProcessModel {
   static constexpr int kStates = N;
   static constexpr bool kLinear = false;
   static constexpr bool kClosedForm = false;
+  static constexpr bool kTranslation = false;
 
   /// f about x, with deviations by subtraction: f(x + e) - f(x) loses the digits that f(x) and
   /// f(x + e) share, so filters limit how small alpha may be (see SigmaPoints).
@@ -56,6 +59,15 @@ struct ProcessModel {
       }
     }
   };
+
+  /// From the model's add_noise(P, dt), for a model that has no Q of its own.
+  Covariance Q(Scalar dt) const {
+    Covariance q;
+    math::set_zero(q);
+    derived().add_noise(q, dt);
+    math::mirror_lower(q);
+    return q;
+  }
 
   NumericExpansion about(const State& x, Scalar dt) const {
     return NumericExpansion{derived(), x, dt, derived().f(x, dt)};

@@ -54,6 +54,7 @@ struct SpeedHeading : ProcessModel<SpeedHeading<Scalar_, HeadingBias, SpeedScale
   using typename Base::State;
   using Input = Vector<Scalar, 3>;  ///< forward speed, starboard speed (m/s), heading (rad)
   static constexpr bool kLinear = kStates == 2;
+  static constexpr bool kTranslation = kStates == 2;
 
   using Params = SpeedHeadingParams<Scalar>;
 

@@ -62,14 +62,6 @@ struct SpeedHeadingCurrent : ProcessModel<SpeedHeadingCurrent<Scalar_>, Scalar_,
     return phi;
   }
 
-  Covariance Q(Scalar dt) const {
-    Covariance q;
-    math::set_zero(q);
-    add_noise(q, dt);
-    math::mirror_lower(q);
-    return q;
-  }
-
   /// x <- f(x), P <- Phi P Phi' + Q in place.
   template <class Value>
   AUVEST_INLINE void propagate(Belief<Value, 4>& belief, Scalar dt) const {
@@ -96,6 +88,7 @@ struct SpeedHeadingCurrent : ProcessModel<SpeedHeadingCurrent<Scalar_>, Scalar_,
   }
 
  private:
+  friend Base;
   template <class Value>
   AUVEST_INLINE void move(Vector<Value, 4>& x, Scalar dt) const {
     Scalar sine, cosine;

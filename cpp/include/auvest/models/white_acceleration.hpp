@@ -61,14 +61,6 @@ struct WhiteAcceleration : ProcessModel<WhiteAcceleration<Scalar_, Axes>, Scalar
     return phi;
   }
 
-  Covariance Q(Scalar dt) const {
-    Covariance q;
-    math::set_zero(q);
-    add_noise(q, dt);
-    math::mirror_lower(q);
-    return q;
-  }
-
   /// x <- Phi x, P <- Phi P Phi' + Q in place.
   template <class Value>
   AUVEST_INLINE void propagate(Belief<Value, kStates>& belief, Scalar dt) const {

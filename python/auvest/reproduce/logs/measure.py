@@ -196,7 +196,7 @@ def _rows(name: str, logs: list[LogFolder]) -> list[Row]:
         chosen = settings
         if kernel is not None:
             chosen = replace(settings, filter=replace(settings.filter, kernel=kernel))
-        found = [replay(log, chosen, filter_name=filter_name).numbers for log in logs]
+        found = [replay(log, chosen, filter_name=filter_name, causes=False).numbers for log in logs]
         rows.append(
             Row(
                 set_name=name,
@@ -224,7 +224,7 @@ def _tracking(logs: list[LogFolder]) -> list[TrackingRow]:
         for every_s in TRACKING_TARGETS:
             for filter_name, near_field in runs:
                 chosen = _every(settings, every_s, near_field, adaptive=filter_name == "aukf")
-                numbers = replay(log, chosen, filter_name=filter_name).numbers
+                numbers = replay(log, chosen, filter_name=filter_name, causes=False).numbers
                 rows.append(
                     TrackingRow(
                         log.path.name, every_s, filter_name, near_field, numbers["held_out_rmse_m"]
@@ -247,7 +247,9 @@ def _baseline_walk(logs: list[LogFolder]) -> dict[str, float]:
     chosen = replace(settings, odometry=replace(settings.odometry, sigma_turn=BASELINE_WALK))
     names: tuple[FilterName, ...] = ("ekf", "robust-ekf")
     return {
-        name: _mean([replay(log, chosen, filter_name=name).numbers for log in logs], "rmse_m")
+        name: _mean(
+            [replay(log, chosen, filter_name=name, causes=False).numbers for log in logs], "rmse_m"
+        )
         for name in names
     }
 
@@ -262,7 +264,7 @@ def _compass(log: LogFolder) -> list[CompassRow]:
                 start=replace(settings.start, sigma_heading_rad=heading),
                 odometry=replace(settings.odometry, sigma_turn=walk),
             )
-            numbers = replay(log, chosen, filter_name="robust-ekf").numbers
+            numbers = replay(log, chosen, filter_name="robust-ekf", causes=False).numbers
             rows.append(CompassRow(heading, walk, log_likelihood(log, chosen), numbers["rmse_m"]))
     return rows
 

@@ -1,0 +1,138 @@
+"""``auvest check``: what a log holds, and what may be wrong with it, before it is used.
+
+A LOG is a folder of CSV files, as docs/logs.md describes it. Its files are read for rates, gaps,
+units and clocks; then it is replayed, and what the measurements leave is judged: a compass from
+another axis, x and y exchanged, a latency, a slant range, a scale, a source that stands apart. Each
+mistake is undone in turn, and the one that makes the measurements likelier by far is named.
+
+The verdict is sound, doubtful or not_trusted. A truth, if there is one, is not looked at. The words
+for causes are those of docs/logs.md. The settings matter: with sigmas that are ten times too small
+no log is sound.
+
+Examples
+--------
+  auvest check logs/goats14 --config goats14
+
+  auvest check my_log --json | jq '.logs[].findings[] | .cause, .file, .line, .message'
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from auvest.commands import options
+from auvest.commands.console import Terminal, table
+from auvest.commands.version import version
+from auvest.logs.check import FileSeen
+from auvest.logs.findings import worst
+from auvest.replay import Settings, find_settings
+from auvest.replay.checks import Checked, check
+from auvest.replay.config import FilterName, packaged_settings
+
+
+def command(
+    logs: Annotated[
+        list[Path], typer.Argument(metavar="LOG...", help="Folders of logs.", show_default=False)
+    ],
+    filter_name: Annotated[
+        FilterName | None,
+        typer.Option(
+            "--filter",
+            help="The filter.",
+            show_default="that of the settings, else robust-ekf for ranges and ukf for fixes",
+        ),
+    ] = None,
+    config: Annotated[
+        str | None,
+        typer.Option(
+            help="Settings: a TOML file, or one of " + ", ".join(packaged_settings()) + ".",
+            metavar="FILE",
+            show_default="defaults; see docs/logs.md",
+        ),
+    ] = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Check; the help text is the module's."""
+    terminal = Terminal(as_json=as_json, quiet=quiet)
+    with terminal.usage_errors():
+        settings = Settings() if config is None else find_settings(config)
+        for path in logs:
+            if not path.is_dir():
+                raise ValueError(f"LOG: {path} is not a folder (docs/logs.md)")
+        checked = [check(path, settings, filter_name) for path in logs]
+    terminal.result_json(
+        {
+            "command": "check",
+            "version": version(),
+            "verdict": worst(one.verdict for one in checked),
+            "findings": [
+                {"log": one.name, **each.document()} for one in checked for each in one.findings
+            ],
+            "logs": [one.document() for one in checked],
+        }
+    )
+    for one in checked:
+        _show(terminal, one)
+
+
+def _show(terminal: Terminal, one: Checked) -> None:
+    if one.files:
+        terminal.result(_files(one))
+    if one.health is not None and one.health.measurements:
+        terminal.result(_sources(one))
+    for found in one.findings:
+        terminal.result(f"{found.verdict.replace('_', ' '):11} {found.cause}: {found.text}")
+    words = one.verdict.replace("_", " ")
+    reason = f", {one.health.reason}" if one.verdict == "sound" and one.health else ""
+    terminal.result(f"verdict     {words}{reason}\n")
+
+
+def _files(one: Checked) -> Table:
+    rows = [
+        (
+            name,
+            f"{seen.lines}",
+            f"{seen.first_s:.10g} to {seen.last_s:.10g}" if seen.lines else "",
+            f"{seen.usual_step_s:.3g}" if seen.lines > 1 else "",
+            _longest(seen),
+        )
+        for name, seen in one.files.items()
+    ]
+    header = ("file", "lines", "time / s", "usual step / s", "longest / s")
+    return table(one.name, header, rows, right={1, 3, 4})
+
+
+def _longest(seen: FileSeen) -> str:
+    return f"{seen.long[0].length_s:.3g} (line {seen.long[0].line})" if seen.long else ""
+
+
+def _sources(one: Checked) -> Table:
+    assert one.health is not None
+    seen = (one.files.get("ranges.csv") or one.files["fixes.csv"]).sources
+    rows = [
+        (
+            f"{source.source}",
+            f"{source.measurements}",
+            f"{seen[source.source].low_m:.4g} to {seen[source.source].high_m:.4g}",
+            f"{source.median_m:+.2f}",
+            f"{source.spread_m:.2f}",
+            f"{100 * source.beyond_share:.0f}",
+            f"{100 * source.trend:+.2f}",
+        )
+        for source in one.health.sources
+    ]
+    header = (
+        "source",
+        "used",
+        "range / m",
+        "median / m",
+        "spread / m",
+        "> 3 sigma / %",
+        "trend / %",
+    )
+    return table("innovations of range", header, rows, right=set(range(7)))

@@ -1,0 +1,156 @@
+"""All that is checked of a log: what its files show, and what a replay of it leaves.
+
+``auvest check`` and ``auvest replay`` do the same, without a look at the truth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from auvest.errors import FilterError
+from auvest.logs import LogError, LogFolder
+from auvest.logs.check import FileSeen, Limits, from_error, ignored_files, survey
+from auvest.logs.findings import VERDICTS, Finding, Verdict, finding, worst
+from auvest.logs.origin import local_origin, shifted
+from auvest.replay import diagnosis
+from auvest.replay.config import FilterName, Settings
+from auvest.replay.health import Health, Residuals, findings, health
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A log that was checked.
+
+    Attributes
+    ----------
+    name : str
+        Name of the log's folder.
+    verdict : str
+        "sound", "doubtful" or "not_trusted".
+    findings : list of Finding
+        What is wrong, the worst first.
+    files : dict of str to FileSeen
+        What is there; those that could be read.
+    health : Health or None
+        The figures of the innovations; None if no filter could be run.
+    """
+
+    name: str
+    verdict: Verdict
+    findings: list[Finding]
+    files: dict[str, FileSeen]
+    health: Health | None
+
+    def document(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "log": self.name,
+            "verdict": self.verdict,
+            "findings": [one.document() for one in self.findings],
+            "files": {name: seen.document() for name, seen in self.files.items()},
+            "health": self.health.document() if self.health else None,
+        }
+
+
+def filter_of(log: LogFolder, settings: Settings, chosen: FilterName | None) -> FilterName:
+    """Give the filter: that which is chosen, that of the settings, or that which fits the log."""
+    return chosen or settings.filter.kind or ("ukf" if log.tracking else "robust-ekf")
+
+
+def limits(settings: Settings) -> Limits:
+    """Give what the survey of the files asks of the settings."""
+    return Limits(
+        gap_s=settings.odometry.gap_s,
+        reorder_s=settings.log.reorder_s,
+        max_step_s=settings.odometry.max_step_s,
+    )
+
+
+def files(log: LogFolder, settings: Settings) -> list[Finding]:
+    """Say what the files of a log show; end where a replay cannot be right.
+
+    Raises
+    ------
+    LogError
+        If a file cannot be read, or a replay is refused (:meth:`auvest.logs.check.Survey.refuse`).
+    """
+    asked = limits(settings)
+    seen = survey(log, asked)
+    seen.refuse(log, asked)
+    return seen.findings
+
+
+def innovations(
+    log: LogFolder,
+    settings: Settings,
+    filter_name: FilterName,
+    residuals: Residuals,
+    found: list[Finding],
+    *,
+    causes: bool = True,
+) -> list[Finding]:
+    """Say what a replay left, and why.
+
+    Where the files have shown already what is wrong, no other cause is looked for.
+    """
+    shown = findings(residuals)
+    if not causes or worst(one.verdict for one in found) != "sound":
+        return shown
+    named = diagnosis.diagnose(log, settings, filter_name, gross=bool(shown))
+    if named:  # it explains why one source has more of it than others
+        shown = [one for one in shown if one.cause != "source_off"]
+    return [*named, *shown]
+
+
+def check(path: Path, settings: Settings, filter_name: FilterName | None = None) -> Checked:
+    """Check a log; what cannot be read is a finding, not an error.
+
+    Parameters
+    ----------
+    path : Path
+        The log's folder.
+    settings : Settings
+        Noise and the rest, as of a replay.
+    filter_name : str, optional
+        The filter; default: that of the settings, else robust-ekf for ranges and ukf for fixes.
+    """
+    found: list[Finding] = []
+    seen: dict[str, FileSeen] = {}
+    left: Residuals | None = None
+    try:
+        log = LogFolder(path, truth=False)
+        shown = survey(log, limits(settings))
+        found += shown.findings
+        seen = shown.files
+        if worst(one.verdict for one in found) != "not_trusted":
+            shown.refuse(log, limits(settings))
+            left = Residuals()
+            found += _replayed(log, settings, filter_name, left, found)
+    except FilterError as error:
+        message = f"the filter cannot do a step: {error}"
+        found.append(finding("innovations", message, verdict="not_trusted"))
+    except LogError as error:
+        if path.is_dir() and not seen:
+            found += ignored_files(path)
+        found.append(from_error(error))
+    found.sort(key=lambda one: -VERDICTS.index(one.verdict))
+    verdict = worst(one.verdict for one in found)
+    judged = health(left, found) if left is not None else None
+    return Checked(path.resolve().name, verdict, found, seen, judged)
+
+
+def _replayed(
+    log: LogFolder,
+    settings: Settings,
+    filter_name: FilterName | None,
+    left: Residuals,
+    found: list[Finding],
+) -> list[Finding]:
+    name = filter_of(log, settings, filter_name)
+    origin = local_origin(log)
+    local = log if origin is None else shifted(log, origin)
+    for batch in diagnosis.engine(local, settings, name).batches():
+        left.add(batch)
+    return innovations(local, settings, name, left, found)

@@ -1,0 +1,434 @@
+"""Why the innovations of a replay do not fit: it is run again with one mistake undone at a time.
+
+Each hypothesis changes the log as a mistake of a known cause would be undone (the heading mirrored,
+x and y exchanged, a latency taken off, ...). What makes the innovations an order more likely than
+the log as it is, and than any other, is the cause that is named.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from auvest._arguments import Floats
+from auvest.errors import FilterError
+from auvest.logs import LogError, LogFolder
+from auvest.logs.changed import Change, ChangedLog, HeldLog, columns_changed
+from auvest.logs.findings import Finding, finding
+from auvest.logs.reader import CsvTable, Rows
+from auvest.replay.config import FilterName, Settings
+from auvest.replay.engine import Localiser, Replay, Tracker
+from auvest.replay.health import FEW, Residuals, numbers_measured
+from auvest.replay.sources import Sources
+from auvest.replay.tables import Columns
+
+#: So many lines of each file are looked at: a diagnosis of a day takes no longer than of an hour.
+LINES = 100_000
+#: Share of outliers that the likelihood allows for, and over how many metres they are spread.
+OUTLIERS, OUTLIER_REACH_M = 0.05, 100.0
+#: A cause must make the innovations so much likelier: in all, and per measurement (nats).
+GAIN, GAIN_EACH = 12.0, 0.08
+#: Of two that explain the log within this share of the gain, and so many nats, both are named.
+TIE_SHARE, TIE = 0.05, 6.0
+
+#: What is tried of a number at first; around the best it is then tried more finely.
+LATENCIES_S = (0.5, 2.0, 8.0)
+DEPTHS_M = (8.0, 24.0, 72.0)
+SCALES = (0.9, 0.96, 1.04, 1.1)
+NOISES = (3.0, 10.0)
+FINER = 3
+
+_FOURTH = math.pi / 2
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """One mistake, and the log or the settings with it undone.
+
+    Attributes
+    ----------
+    cause : str
+        One of :data:`auvest.logs.findings.CAUSES`.
+    changes : mapping
+        What becomes of the rows of each file.
+    message : str
+        What it says of the log.
+    settings : callable
+        What becomes of the settings.
+    source : int or None
+        A source that is left out.
+    """
+
+    cause: str
+    changes: Mapping[str, Change]
+    message: str
+    settings: Callable[[Settings], Settings] = lambda settings: settings
+    source: int | None = None
+
+
+@dataclass(frozen=True)
+class Number:
+    """A mistake of some size: a hypothesis for each value of it, and the values to begin with."""
+
+    make: Callable[[float], Hypothesis]
+    values: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A hypothesis and the logarithm of the likelihood of the innovations under it."""
+
+    hypothesis: Hypothesis
+    log_likelihood: float
+
+
+def engine(log: LogFolder, settings: Settings, filter_name: FilterName) -> Replay:
+    """Make the replay that a log is for."""
+    return (Tracker if log.tracking else Localiser)(log, settings, filter_name)
+
+
+def diagnose(
+    log: LogFolder, settings: Settings, filter_name: FilterName, *, gross: bool = True
+) -> list[Finding]:
+    """Name the cause, or the causes that the log cannot tell apart; none if nothing explains it.
+
+    Parameters
+    ----------
+    log : LogFolder
+        The log; of its truth no more is used than where the run starts, if nothing else says so.
+    settings : Settings
+        Filter, noise and the rest.
+    filter_name : str
+        The filter. The refits are made with a robust one where there is one.
+    gross : bool
+        Whether to look for mistakes that no filter overlooks, such as another axis, too.
+    """
+    kind: FilterName = "ukf" if log.tracking else "robust-ekf"
+    if filter_name in ("robust-ukf", "robust-ekf"):
+        kind = filter_name
+    start = engine(log, settings, kind).start
+    held = HeldLog(log, LINES, start if math.isfinite(start[0]) else None)
+    run = _Refits(held, settings, kind)
+    as_is = run.run(Hypothesis("", {}, ""))
+    if as_is is None or len(as_is.rows["nis"]) < FEW:
+        return []
+    count = len(as_is.rows["nis"])
+    base = float(np.sum(log_likelihoods(as_is.rows)))
+    fits = [
+        fit
+        for family in _families(held, as_is.rows, gross=gross)
+        for fit in run.best(family, base, count)
+    ]
+    if not fits:
+        return []
+    best = max(fits, key=lambda fit: fit.log_likelihood)
+    gain = best.log_likelihood - base
+    if gain < max(GAIN, GAIN_EACH * count):
+        return []
+    slack = max(TIE, TIE_SHARE * gain)
+    named = [fit for fit in fits if fit.log_likelihood > best.log_likelihood - slack]
+    if best.hypothesis.cause != "noise_too_small":
+        named = [fit for fit in named if fit.hypothesis.cause != "noise_too_small"]
+    named.sort(key=lambda fit: -fit.log_likelihood)
+    found = {}
+    for fit in named[:2]:
+        other = " (or another cause that the log cannot tell from it)" * (len(named) > 1)
+        each = (fit.log_likelihood - base) / count
+        message = f"{fit.hypothesis.message}{other}: likelier by {each:.2g} nats per measurement"
+        found[fit.hypothesis.cause] = finding(fit.hypothesis.cause, message)
+    return list(found.values())
+
+
+def log_likelihoods(rows: Columns) -> Floats:
+    """Logarithm of the likelihood of each measurement, given those before it.
+
+    A measurement is an outlier with a small probability, and then anywhere within a wide reach;
+    this makes gross errors cost the same under every hypothesis.
+    """
+    numbers = numbers_measured(rows)
+    sigma = rows["sigma_0"]
+    inlier = -0.5 * rows["nis"] - np.log(sigma) - 0.5 * numbers * math.log(2 * math.pi)
+    reach = math.log(OUTLIER_REACH_M) * np.ones(len(sigma))
+    if numbers == 2:
+        near = rows["near_field"] != 0  # there both numbers are metres
+        inlier -= np.log(rows["sigma_1"])
+        inlier[near] += np.log(np.maximum(rows["range_m"][near], 1e-3))
+        reach += math.log(2 * math.pi)
+    return _with_outliers(inlier, reach)
+
+
+def _with_outliers(inlier: Floats, reach: Floats | float) -> Floats:
+    return np.logaddexp(math.log(1 - OUTLIERS) + inlier, math.log(OUTLIERS) - reach)
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a refit left: innovations, and the track (time, x, y)."""
+
+    rows: Columns
+    track: Rows
+
+
+class _Refits:
+    """Runs a log again under hypotheses."""
+
+    def __init__(self, log: LogFolder, settings: Settings, kind: FilterName) -> None:
+        self._log = log
+        self._settings = settings
+        self._kind = kind
+
+    def run(self, one: Hypothesis) -> Run | None:
+        """Run it; None if it cannot be run."""
+        residuals, track = Residuals(), [np.empty((0, 3))]
+        log = ChangedLog(self._log, one.changes)
+        try:
+            for batch in engine(log, one.settings(self._settings), self._kind).batches():
+                residuals.add(batch)
+                columns = [batch.estimates[name] for name in ("time_s", "x_m", "y_m")]
+                track.append(np.column_stack(columns))
+        except (LogError, FilterError):
+            return None
+        return Run(residuals.rows(), np.concatenate(track))
+
+    def best(self, family: list[Hypothesis] | Number, base: float, count: int) -> list[Fit]:
+        """Give the likeliest of a family, in a list; none if the family is empty."""
+        if not isinstance(family, Number):
+            fits = [self._fit(one, count) for one in family]
+            return [max(fits, key=_likelihood)] if fits else []
+        values = sorted(family.values)
+        tried = {value: self._fit(family.make(value), count) for value in values}
+        for _ in range(FINER):
+            top = max(tried, key=lambda value: tried[value].log_likelihood)
+            if tried[top].log_likelihood < base:  # far off everywhere: not this
+                break
+            at = values.index(top)
+            low = values[at - 1] if at > 0 else top * top / values[1]
+            high = values[at + 1] if at + 1 < len(values) else top * top / values[-2]
+            for value in (math.sqrt(low * top), math.sqrt(top * high)):
+                tried[value] = self._fit(family.make(value), count)
+            values = sorted(tried)
+        return [max(tried.values(), key=_likelihood)]
+
+    def _fit(self, one: Hypothesis, count: int) -> Fit:
+        run = self.run(one)
+        if run is None or len(run.rows["nis"]) == 0:
+            return Fit(one, -math.inf)
+        each = log_likelihoods(run.rows)
+        if one.source is None:
+            return Fit(one, float(each.mean()) * count)
+        # What was left out is judged by its own offset and spread from the track of the others.
+        apart, off_m, spread_m = self._apart(run, one.source)
+        told = replace(one, message=one.message.format(off=off_m, spread=spread_m))
+        left = max(count - len(each), 0)
+        return Fit(told, float(each.sum()) + left * (float(apart.mean()) if len(apart) else 0.0))
+
+    def _apart(self, run: Run, source: int) -> tuple[Floats, float, float]:
+        """Likelihoods of a source's measurements given the track that the others gave.
+
+        Each number that it measures has an offset and a spread of its own: the median and the
+        median absolute deviation of its differences from the track; those of range are returned.
+        """
+        table = self._log["fixes.csv" if self._log.tracking else "ranges.csv"]
+        measured = _rows(table)
+        measured = measured[measured[:, 1] == source]
+        places = _sources(self._log, self._settings).locate(measured[:, 0], measured[:, 1])
+        inside = ~np.isnan(places[:, 0])
+        inside &= (measured[:, 0] >= run.track[0, 0]) & (measured[:, 0] <= run.track[-1, 0])
+        measured, places = measured[inside], places[inside]
+        if len(measured) == 0:
+            return np.empty(0), math.nan, math.nan
+        at = [np.interp(measured[:, 0], run.track[:, 0], run.track[:, k]) for k in (1, 2)]
+        away = (at[0] - places[:, 0]) + 1j * (at[1] - places[:, 1])
+        numbers = [measured[:, 2] - np.abs(away)]
+        least = [self._settings.ranges.sigma_m]
+        if self._log.tracking:
+            numbers.append(np.angle(np.exp(1j * measured[:, 3]) / np.exp(1j * np.angle(away))))
+            fixes = self._settings.fixes
+            least = [fixes.sigma_range_m, fixes.sigma_bearing_rad]
+        inlier = np.zeros(len(measured))
+        found = []
+        for off, sigma in zip(numbers, least, strict=True):
+            median = float(np.median(off))
+            spread = max(1.4826 * float(np.median(np.abs(off - median))), sigma)
+            inlier += -0.5 * ((off - median) / spread) ** 2 - math.log(spread)
+            inlier -= 0.5 * math.log(2 * math.pi)
+            found.append((median, spread))
+        reach = math.log(OUTLIER_REACH_M) + (len(numbers) - 1) * math.log(2 * math.pi)
+        return _with_outliers(inlier, reach), *found[0]
+
+
+def _sources(log: LogFolder, settings: Settings) -> Sources:
+    sources = Sources(log.beacons(), settings.log.leader_gap_s)
+    if "leaders.csv" in log:
+        sources.add(_rows(log["leaders.csv"]))
+    return sources
+
+
+def _likelihood(fit: Fit) -> float:
+    return fit.log_likelihood
+
+
+def _families(log: LogFolder, rows: Columns, *, gross: bool) -> Iterator[list[Hypothesis] | Number]:
+    """Give the hypotheses, those of one cause together."""
+    tracking = log.tracking
+    measured = "fixes.csv" if tracking else "ranges.csv"
+    if gross:
+        yield list(_axes(log))
+        yield list(_headings(tracking, mirrored=True))
+        yield list(_headings(tracking, mirrored=False))
+        yield list(_degrees(tracking))
+        yield list(_noises())
+    yield Number(
+        lambda scale: Hypothesis(
+            "range_scale",
+            {measured: _of_range(lambda r: r * scale)},
+            f"ranges times {scale:.3f} fit: a scale (speed of sound, antenna delay)",
+        ),
+        SCALES,
+    )
+    yield Number(
+        lambda depth: Hypothesis(
+            "slant_range",
+            {measured: _of_range(lambda r: _level(r, depth))},
+            f"ranges fit with a depth difference of about {depth:.2g} m to the sources",
+        ),
+        DEPTHS_M,
+    )
+    if not tracking:
+        yield Number(
+            lambda latency: Hypothesis(
+                "latency",
+                {measured: _earlier(latency)},
+                f"ranges fit when taken {latency:.2g} s before their time",
+            ),
+            LATENCIES_S,
+        )
+    sources = np.unique(rows["source"]).astype(int).tolist()
+    if gross and len(sources) > 1:
+        yield [
+            Hypothesis(
+                "source_off",
+                {measured: _without(source)},
+                f"source {source}: its ranges are {{off:+.3g}} m off the track that the others "
+                "give, with a spread of {spread:.2g} m",
+                source=source,
+            )
+            for source in sources
+        ]
+
+
+def _of_range(compute: Callable[[Rows], Rows]) -> Change:
+    return columns_changed({2: lambda rows: compute(rows[:, 2])})
+
+
+def _level(range_m: Rows, depth_m: float) -> Rows:
+    return np.sqrt(np.maximum(range_m**2 - depth_m**2, 0.0))
+
+
+def _earlier(latency_s: float) -> Change:
+    return columns_changed({0: lambda rows: rows[:, 0] - latency_s})
+
+
+def _axes(log: LogFolder) -> Iterator[Hypothesis]:
+    def exchange(first: int) -> Change:
+        return columns_changed(
+            {first: lambda rows: rows[:, first + 1], first + 1: lambda rows: rows[:, first]}
+        )
+
+    changes = {"beacons.csv": exchange(1), "leaders.csv": exchange(2)}
+    message = "it fits with x and y of the sources exchanged (NED, ENU)"
+    if not log.tracking or len(log.beacons()) > 1 or "leaders.csv" in log:
+        yield Hypothesis("axes_exchanged", changes, message)
+
+
+def _headings(tracking: bool, *, mirrored: bool) -> Iterator[Hypothesis]:
+    """Headings, or bearings, that turn the wrong way or count from another axis."""
+    cause = "heading_mirrored" if mirrored else "heading_turned"
+    what = "bearing" if tracking else "heading"
+    angles = (0.0, _FOURTH, 2 * _FOURTH, -_FOURTH)[0 if mirrored else 1 :]
+    sign = -1.0 if mirrored else 1.0
+    for angle in angles:
+        degrees = math.degrees(angle)
+        how = f"{what} times -1 plus {degrees:g}" if mirrored else f"{what} plus {degrees:g}"
+        message = f"it fits with the {how} degrees"
+        turned = columns_changed({3: partial(_turned, sign, angle)})
+        if tracking:
+            yield Hypothesis(cause, {"fixes.csv": turned}, message)
+            continue
+        changes: dict[str, Change] = {"start.csv": turned}
+        if mirrored:
+            changes["odometry.csv"] = _turning(lambda turn: -turn)
+        yield Hypothesis(cause, changes, message)
+    if mirrored and not tracking:
+        message = "it fits with turns of the other sign"
+        yield Hypothesis(cause, {"odometry.csv": _turning(lambda turn: -turn)}, message)
+
+
+def _degrees(tracking: bool) -> Iterator[Hypothesis]:
+    if tracking:
+        change = columns_changed({3: lambda rows: np.radians(rows[:, 3])})
+        yield Hypothesis("degrees", {"fixes.csv": change}, "it fits with bearings in degrees")
+        return
+    message = "it fits with turns in degrees"
+    yield Hypothesis("degrees", {"odometry.csv": _turning(np.radians)}, message)
+
+
+def _turning(compute: Callable[[Rows], Rows]) -> Change:
+    """Change the turns of an odometry file, which are its last column in both layouts."""
+
+    def change(rows: Rows) -> Rows:
+        made = rows.copy()
+        made[:, -1] = compute(rows[:, -1])
+        return made
+
+    return change
+
+
+def _noises() -> Iterator[Hypothesis]:
+    for times in NOISES:
+
+        def louder(settings: Settings, times: float = times) -> Settings:
+            s = settings
+            return replace(
+                s,
+                start=replace(
+                    s.start, **{name: times * value for name, value in vars(s.start).items()}
+                ),
+                odometry=replace(
+                    s.odometry,
+                    sigma_distance=times * s.odometry.sigma_distance,
+                    sigma_drift=times * s.odometry.sigma_drift,
+                    sigma_turn=times * s.odometry.sigma_turn,
+                ),
+                ranges=replace(s.ranges, sigma_m=times * s.ranges.sigma_m),
+                fixes=replace(
+                    s.fixes,
+                    sigma_range_m=times * s.fixes.sigma_range_m,
+                    sigma_bearing_rad=times * s.fixes.sigma_bearing_rad,
+                ),
+                process=replace(
+                    s.process,
+                    **{name: times**2 * value for name, value in vars(s.process).items()},
+                ),
+            )
+
+        message = f"it fits with all standard deviations of the settings times {times:g}"
+        yield Hypothesis("noise_too_small", {}, message, louder)
+
+
+def _turned(sign: float, angle: float, rows: Rows) -> Rows:
+    turned = sign * rows[:, 3] + angle
+    return np.arctan2(np.sin(turned), np.cos(turned))
+
+
+def _without(source: int) -> Change:
+    return lambda rows: rows[rows[:, 1] != source]
+
+
+def _rows(table: CsvTable) -> Rows:
+    parts = [np.empty((0, len(table.columns)))]
+    return np.concatenate(parts + [rows for rows, _ in table.chunks()])

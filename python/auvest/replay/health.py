@@ -1,0 +1,272 @@
+"""Whether a replay is to be trusted, judged by its innovations; no truth is needed.
+
+The mean NIS of all measurements misleads: a few outliers that the filter threw away make it a
+hundred. What is judged is the NIS of those within three sigma, against its mean for a consistent
+filter (which that limit makes smaller than the number of degrees of freedom), how many are beyond,
+how often the filter lost its track, and whether one source stands apart from the others.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from auvest.logs.findings import Finding, Verdict, finding, worst
+from auvest.replay import tables
+from auvest.replay.samples import Samples
+from auvest.replay.tables import Batch, Columns
+
+#: Measurements that are kept to be judged: evenly taken from all, so that memory stays bounded.
+KEPT = 20_000
+#: A measurement is within three sigma if its NIS is below these, for one number and for two.
+WITHIN = {1: 9.0, 2: 11.829}
+#: 95 % of a consistent filter's NIS lie below these.
+BELOW_95 = {1: 3.841, 2: 5.991}
+#: Fewer measurements than this say nothing.
+FEW = 12
+#: Share beyond three sigma that makes a replay doubtful, and not to be trusted; clean acoustic
+#: ranges have a tenth of multipath.
+BEYOND_DOUBTFUL, BEYOND_NOT_TRUSTED = 0.25, 0.4
+#: Mean NIS within three sigma over that of a consistent filter: its sigmas are too small.
+NIS_DOUBTFUL = 1.9
+#: Recoveries from lock-out, at least so many and at least in this share of the measurements.
+RECOVERIES_DOUBTFUL, RECOVERIES_NOT_TRUSTED, RECOVERY_SHARE = 2, 8, 0.02
+#: Share of a source beyond three sigma that makes it stand apart from the others, and how many
+#: times more it is than theirs.
+SOURCE_OFF, SOURCE_TIMES = 0.45, 3.0
+#: So many measurements in a row beyond three sigma: the track is not to be trusted there.
+ASTRAY = 5
+
+#: What a replay keeps of each measurement.
+COLUMNS = (
+    "time_s", "source", "outcome", "innovation_0", "innovation_1", "sigma_0", "sigma_1",
+    "near_field", "nis", "recovered", "range_m",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class SourceHealth:
+    """One source's innovations.
+
+    Attributes
+    ----------
+    source : int
+    measurements : int
+        How many were compared with a prediction.
+    beyond_share : float
+        Share beyond three sigma.
+    median_m, spread_m : float
+        Median of the innovations of range, and 1.4826 times their median absolute deviation.
+    trend : float
+        How innovations grow with the range, m/m: a slope is a scale error.
+    """
+
+    source: int
+    measurements: int
+    beyond_share: float
+    median_m: float
+    spread_m: float
+    trend: float
+
+
+@dataclass(frozen=True)
+class Health:
+    """One verdict with its reason, and the figures behind it.
+
+    Attributes
+    ----------
+    verdict : str
+        "sound", "doubtful" or "not_trusted".
+    reason : str
+        Why.
+    measurements : int
+        How many were compared with a prediction.
+    nis_mean : float or None
+        Mean NIS of those within three sigma.
+    nis_bounds_95 : list of float or None
+        Where it lies for a consistent filter, with 95 % probability.
+    below_95 : float or None
+        Share of all whose NIS is below the 95 % quantile.
+    beyond_share, rejected_share : float or None
+        Share beyond three sigma, and share that the filter threw away.
+    recoveries : int
+        How often the filter lost its track and widened its covariance.
+    recovery_times_s : list of float
+        When, at most the first twenty.
+    sources : list of SourceHealth
+        Each source.
+    untrusted_s : list of (float, float)
+        From when to when the track is not to be trusted: measurements in a row beyond three sigma.
+    """
+
+    verdict: Verdict
+    reason: str
+    measurements: int
+    nis_mean: float | None
+    nis_bounds_95: list[float] | None
+    below_95: float | None
+    beyond_share: float | None
+    rejected_share: float | None
+    recoveries: int
+    recovery_times_s: list[float]
+    sources: list[SourceHealth]
+    untrusted_s: list[tuple[float, float]]
+
+    def document(self) -> dict[str, Any]:
+        """For JSON."""
+        return asdict(self)
+
+
+class Residuals:
+    """What the measurements of a replay left, gathered batch by batch."""
+
+    def __init__(self) -> None:
+        self.recoveries = 0
+        self._samples = Samples(COLUMNS, KEPT)
+
+    def add(self, batch: Batch) -> None:
+        """Take one batch."""
+        self.recoveries += int(batch.measurements["recovered"].sum())
+        self._samples.add({**batch.measurements, "range_m": batch.ranges_m})
+
+    def rows(self) -> Columns:
+        """Give those that were compared with a prediction."""
+        columns = self._samples.columns()
+        compared = ~np.isnan(columns["nis"])
+        return {name: values[compared] for name, values in columns.items()}
+
+
+def numbers_measured(rows: Columns) -> int:
+    """How many numbers a measurement has: a range, or range and bearing."""
+    return 2 if (~np.isnan(rows["innovation_1"])).any() else 1
+
+
+def truncated_moments(numbers: int, limit: float) -> tuple[float, float]:
+    """Mean and standard deviation of a chi-square value of one or two numbers below a limit."""
+    from scipy import stats  # here, because it is slow to import
+
+    inside = stats.chi2.cdf(limit, numbers)
+    mean = numbers * stats.chi2.cdf(limit, numbers + 2) / inside
+    square = numbers * (numbers + 2) * stats.chi2.cdf(limit, numbers + 4) / inside
+    return float(mean), math.sqrt(float(square - mean * mean))
+
+
+def findings(residuals: Residuals) -> list[Finding]:
+    """Say what the innovations of a replay show, without asking why."""
+    rows = residuals.rows()
+    count = len(rows["nis"])
+    if count < FEW:
+        return []
+    numbers = numbers_measured(rows)
+    within = rows["nis"] < WITHIN[numbers]
+    found = []
+    beyond = 1 - float(within.mean())
+    if beyond > BEYOND_DOUBTFUL:
+        bad = beyond > BEYOND_NOT_TRUSTED
+        message = f"{100 * beyond:.0f} % of {count} measurements are beyond three sigma"
+        verdict: Verdict = "not_trusted" if bad else "doubtful"
+        found.append(finding("innovations", message, verdict=verdict))
+    else:
+        mean = float(rows["nis"][within].mean()) / truncated_moments(numbers, WITHIN[numbers])[0]
+        if mean > NIS_DOUBTFUL:
+            message = (
+                f"innovations are {math.sqrt(mean):.2g} times as large as the settings say, "
+                "outliers apart"
+            )
+            found.append(finding("innovations", message))
+    least = max(RECOVERIES_DOUBTFUL, RECOVERY_SHARE * count)
+    if residuals.recoveries >= least:
+        message = (
+            f"the filter lost its track {residuals.recoveries} times in {count} measurements: a "
+            "range scale, a wrong survey or sigmas that are too small"
+        )
+        bad = residuals.recoveries >= RECOVERIES_NOT_TRUSTED
+        found.append(finding("recoveries", message, verdict="not_trusted" if bad else "doubtful"))
+    return found + _apart(rows, within)
+
+
+def _apart(rows: Columns, within: npt.NDArray[np.bool_]) -> list[Finding]:
+    """Find a source whose measurements are thrown away while the others' are not."""
+    shares = {
+        int(source): 1 - float(within[rows["source"] == source].mean())
+        for source in np.unique(rows["source"])
+        if (rows["source"] == source).sum() >= FEW
+    }
+    found = []
+    for source, share in shares.items():
+        others = max([other for name, other in shares.items() if name != source], default=share)
+        if share > SOURCE_OFF and share > SOURCE_TIMES * others:
+            message = (
+                f"source {source}: {100 * share:.0f} % beyond three sigma, of the others at most "
+                f"{100 * others:.0f} %: is its position, number or calibration wrong?"
+            )
+            found.append(finding("source_off", message))
+    return found
+
+
+def health(residuals: Residuals, found: Iterable[Finding]) -> Health:
+    """Give the verdict of all findings, and the figures of the innovations."""
+    found = list(found)
+    verdict = worst(one.verdict for one in found)
+    rows = residuals.rows()
+    count = len(rows["nis"])
+    reasons = [one.text for one in found if one.verdict == verdict]
+    if verdict == "sound":
+        few = f"only {count} measurements: hardly anything to judge by"
+        reasons = ["innovations are as large as the settings say" if count >= FEW else few]
+    if count == 0:
+        return Health(
+            verdict, reasons[0], 0, None, None, None, None, None, residuals.recoveries, [], [], []
+        )
+    numbers = numbers_measured(rows)
+    within = rows["nis"] < WITHIN[numbers]
+    mean, spread = truncated_moments(numbers, WITHIN[numbers])
+    reach = 1.96 * spread / math.sqrt(max(int(within.sum()), 1))
+    return Health(
+        verdict=verdict,
+        reason=reasons[0],
+        measurements=count,
+        nis_mean=float(rows["nis"][within].mean()) if within.any() else None,
+        nis_bounds_95=[mean - reach, mean + reach],
+        below_95=float((rows["nis"] < BELOW_95[numbers]).mean()),
+        beyond_share=1 - float(within.mean()),
+        rejected_share=float((rows["outcome"] == tables.REJECTED).mean()),
+        recoveries=residuals.recoveries,
+        recovery_times_s=rows["time_s"][rows["recovered"] != 0][:20].tolist(),
+        sources=[_source(rows, within, source) for source in np.unique(rows["source"]).tolist()],
+        untrusted_s=_astray(rows["time_s"], within),
+    )
+
+
+def _source(rows: Columns, within: npt.NDArray[np.bool_], source: float) -> SourceHealth:
+    mine = rows["source"] == source
+    plain = mine & (rows["near_field"] == 0)
+    off, range_m = rows["innovation_0"][plain], rows["range_m"][plain]
+    median = float(np.median(off)) if len(off) else math.nan
+    spread = 1.4826 * float(np.median(np.abs(off - median))) if len(off) else math.nan
+    kept = within[plain]
+    trend = math.nan
+    if kept.sum() > 2 and np.ptp(range_m[kept]) > 0:
+        trend = float(np.polyfit(range_m[kept], off[kept], 1)[0])
+    return SourceHealth(
+        source=int(source),
+        measurements=int(mine.sum()),
+        beyond_share=1 - float(within[mine].mean()),
+        median_m=median,
+        spread_m=spread,
+        trend=trend,
+    )
+
+
+def _astray(time_s: npt.NDArray[Any], within: npt.NDArray[np.bool_]) -> list[tuple[float, float]]:
+    """Give the times in which measurement after measurement is beyond three sigma."""
+    order = np.argsort(time_s, kind="stable")
+    time, out = time_s[order], ~within[order]
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], out, [False]]).astype(int)))
+    spans = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+    return [(float(time[a]), float(time[b - 1])) for a, b in spans if b - a >= ASTRAY]

@@ -1,0 +1,1 @@
+"""What people do to logs, done to clean simulated trials."""
