@@ -1,5 +1,8 @@
+#include <pybind11/stl.h>
+
 #include <array>
 #include <cmath>
+#include <string>
 
 #include "binders.hpp"
 #include "mission_scenario.hpp"
@@ -127,6 +130,43 @@ py::dict fly_missions(const py::dict& values) {
   return result;
 }
 
+std::array<const char*, kMissionSources> source_names() {
+  std::array<const char*, kMissionSources> names{};
+  for (int i = 0; i < kMissionSources; ++i) {
+    names[static_cast<std::size_t>(i)] = name_of(static_cast<MissionSource>(i));
+  }
+  return names;
+}
+
+/// The policy as the name of its class and its parameters.
+py::tuple class_of(const AnyInterval<double>& interval) {
+  using Kind = AnyInterval<double>::Kind;
+  switch (interval.kind) {
+    case Kind::kMahalanobis:
+      return py::make_tuple("MahalanobisInterval", to_dict(interval.mahalanobis.params));
+    case Kind::kCovarianceBudget:
+      return py::make_tuple("CovarianceBudget", to_dict(interval.budget.params));
+    case Kind::kFixed:
+      break;
+  }
+  return py::make_tuple("FixedInterval", to_dict(interval.fixed.params));
+}
+
+/// A row of the closed-loop table; kernel: whether it has one, IGG as it comes.
+py::dict source(const std::string& name, const std::string& track, double interval_s) {
+  const auto row = kind_named<MissionSource>(name, "source", source_names());
+  MissionScenario s =
+      mission_source(row, kind_named<MissionTrack>(track, "track", kTracks), interval_s);
+  py::dict result;
+  visit_numbers(s, [&result](const char* key, double& value) { result[key] = value; });
+  result["track"] = track;
+  result["estimate"] = kEstimates[static_cast<std::size_t>(s.estimate)];
+  result["guidance"] = kLaws[static_cast<std::size_t>(s.guidance)];
+  result["interval"] = class_of(s.interval);
+  result["kernel"] = s.kernel.kind != AnyKernel<double>::Kind::kUnit;
+  return result;
+}
+
 }  // namespace
 
 void bind_mission(py::module_& m) {
@@ -137,6 +177,8 @@ void bind_mission(py::module_& m) {
     visit_numbers(s, [&result](const char* name, double& value) { result[name] = value; });
     return result;
   });
+  m.def("mission_sources", &source_names);
+  m.def("mission_source", &source, py::arg("name"), py::arg("track"), py::arg("interval_s"));
 }
 
 }  // namespace bindings

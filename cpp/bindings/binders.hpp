@@ -32,6 +32,7 @@ void bind_intervals(py::module_& m);
 void bind_filters(py::module_& m);
 void bind_function_models(py::module_& m);
 void bind_cooperative(py::module_& m);
+void bind_guidance(py::module_& m);
 void bind_mission(py::module_& m);
 void bind_pilot(py::module_& m);
 void bind_vehicle(py::module_& m);

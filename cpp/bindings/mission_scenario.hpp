@@ -47,13 +47,17 @@ void visit_numbers(MissionScenario& s, Visitor&& v) {
 }
 
 template <class Kind, std::size_t Count>
-Kind kind_named(const py::dict& values, const char* name,
+Kind kind_named(const std::string& given, const char* name,
                 const std::array<const char*, Count>& names) {
-  const auto given = values[name].cast<std::string>();
   for (std::size_t i = 0; i < Count; ++i) {
     if (given == names[i]) return static_cast<Kind>(i);
   }
   throw py::value_error(std::string(name) + " is not one of its names");
+}
+template <class Kind, std::size_t Count>
+Kind kind_named(const py::dict& values, const char* name,
+                const std::array<const char*, Count>& names) {
+  return kind_named<Kind>(values[name].cast<std::string>(), name, names);
 }
 
 // In the order of the enumerations.

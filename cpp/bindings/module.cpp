@@ -14,6 +14,7 @@ PYBIND11_MODULE(_core, m) {
   bind_tracking(m);
   bind_slat(m);
   bind_cooperative(m);
+  bind_guidance(m);
   bind_mission(m);
   bind_pilot(m);
   bind_vehicle(m);

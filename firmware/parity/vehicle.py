@@ -1,4 +1,4 @@
-"""Records of a vehicle: a mission, a hull and an ROV, which every target turns into the same bits.
+"""Records of a vehicle: a mission, its pilot, a hull and an ROV: the same bits on every target.
 
 What the sensors of a mission tell comes from the desk (``simulation/mission.hpp``), in float.
 Records and traces are little-endian 32-bit words (see ``vehicle_replay.hpp``).
@@ -27,7 +27,7 @@ Method: TypeAlias = Literal["rk4", "semi-implicit"]
 PERIOD_S = 0.1
 
 # In the order of the enumerations.
-_KINDS = ("mission", "hull", "rov")
+_KINDS = ("mission", "hull", "rov", "pilot")
 _TRACKS = ("lawnmower", "circle")
 _LAWS = ("adaptive", "crab", "line-of-sight", "integral", "vector-field")
 _KERNELS = ("unit", "huber", "hampel", "igg")
@@ -200,6 +200,71 @@ class MissionRecord(Record):
         )
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PilotRecord(Record):
+    """What the pilot of the sketch hears of a mission: sensors silent or wrong, fixes late.
+
+    Attributes
+    ----------
+    mission : MissionRecord
+        Where the readings come from.
+    """
+
+    mission: MissionRecord
+
+    #: What it hears in a step.
+    READING: ClassVar[np.dtype[Any]] = np.dtype(
+        [("heard", "<u4"), ("values", "<f4", 7), ("fix", "<f4", 2), ("age", "<f4")]
+    )
+
+    @property
+    def rows(self) -> Rows:
+        """What it hears, dtype READING."""
+        told = self.mission.rows
+        rows = np.zeros(len(told), self.READING)
+        rows["heard"] = 15
+        order = ("compass", "pitch", "rates", "log", "depth")
+        rows["values"] = np.column_stack([told[name] for name in order])
+        rows["fix"], rows["age"] = np.nan, np.nan
+        # Of three fixes one comes at once, one late, and one now and then too late for the memory.
+        for number, k in enumerate(np.flatnonzero(~np.isnan(told["fix"][:, 0]))):
+            late = (0, 4, 17 if number % 9 == 2 else 12)[number % 3]
+            if k + late < len(rows):
+                rows["fix"][k + late], rows["age"][k + late] = told["fix"][k], 0.1 * late
+        for first, steps, sensor in ((100, 40, 1), (160, 25, 2), (240, 30, 4), (330, 25, 8)):
+            rows["heard"][first : first + steps] &= 15 - sensor
+        for step, column, value in ((70, 0, 9.0), (75, 3, np.nan), (80, 4, 50.0), (85, 6, -9.0)):
+            rows["values"][step, column] = value
+        rows["fix"][np.flatnonzero(~np.isnan(rows["age"]))[30], 0] = -5.0
+        return rows[: self.kept]
+
+    def to_bytes(self) -> bytes:
+        """Return the record as the replay programs read it."""
+        head = _words(_KINDS.index("pilot")) + _numbers(self.mission.start_m, [0.0])
+        return head + _words(len(self.rows)) + self.rows.tobytes()
+
+    @property
+    def trace(self) -> np.dtype[Any]:
+        """What a target shows after a step; floats as their bits."""
+        return np.dtype(
+            [
+                ("x", "<u4", 4),
+                ("P", "<u4", 10),
+                ("nis", "<u4"),
+                ("heading", "<u4"),
+                ("cross", "<u4"),
+                ("command", "<u4", 3),
+                ("predicted", "u1"),
+                ("corrected", "u1"),
+                ("steered", "u1"),
+                ("mode", "u1"),
+                ("leg", "u1"),
+                ("asks", "u1"),
+                ("implausible", "<u2"),
+            ]
+        )
+
+
 @cache
 def _world() -> tuple[Path, tempfile.TemporaryDirectory[str]]:
     """Compile ``vehicle_world.cpp`` into a folder that lives as long as the program here."""
@@ -326,6 +391,7 @@ NAMES = (
     "hull6-semi-implicit",
     "hull3-semi-implicit",
     "rov",
+    "pilot",
 )
 
 
@@ -398,6 +464,7 @@ def all_records() -> tuple[Record, ...]:
             h=0.02,
         ),
         RovRecord(name="rov", wanted=_stations()),
+        PilotRecord(name="pilot", mission=MissionRecord(name="legs", seconds=200.0, seed=7)),
     )
 
 

@@ -6,6 +6,7 @@
 //                filter, guidance and autopilot answer
 //     kHull      commands of a torpedo: its hull moves, in six degrees of freedom or in the plane
 //     kRov       poses wanted of an ROV: controller, allocation, thrust curve and hull in a loop
+//     kPilot     what the sensors of a mission told, some of them silent, wrong or late: the pilot
 //
 //     record: kind, then
 //       kMission  law, path, arc and speed, depth, period, kernel and rejections, x0, steps;
@@ -13,6 +14,9 @@
 //                 bearing; NaN where nothing was told
 //       kHull     degrees of freedom, method, h, current, x0, steps; per step: command
 //       kRov      h, current, steps; per step: pose
+//       kPilot    place and heading at the start, steps; per step: what was heard, heading, pitch,
+//                 pitch rate, yaw rate, log, sway log, depth, range, bearing and age of a fix; NaN:
+//                 there is none
 #pragma once
 
 #include "auvest/control/autopilot.hpp"
@@ -28,6 +32,7 @@
 #include "auvest/guidance/vector_field.hpp"
 #include "auvest/guidance/waypoints.hpp"
 #include "auvest/math/bits.hpp"
+#include "auvest/mission/pilot.hpp"
 #include "auvest/models/range_bearing.hpp"
 #include "auvest/models/speed_heading_current.hpp"
 #include "auvest/robust/robust_update.hpp"
@@ -41,7 +46,7 @@
 namespace auvest {
 namespace parity {
 
-enum Kind : std::uint32_t { kMission, kHull, kRov };
+enum Kind : std::uint32_t { kMission, kHull, kRov, kPilot };
 
 /// The words of a stream as numbers.
 template <class Stream>
@@ -307,6 +312,66 @@ AUVEST_OUTLINE void replay_rov(Numbers<Stream>& numbers) {
   }
 }
 
+/// The pilot as the sketch `mission` has it, on the first three legs of its plan.
+template <class Stream>
+AUVEST_OUTLINE void replay_pilot(Numbers<Stream>& numbers) {
+  static const Waypoint<float> kPlan[4] = {{20, 20}, {140, 20}, {140, 60}, {20, 60}};
+  using Chip = Pilot<float>;
+  typename Chip::Params params;
+  params.sonar.station_x_m = params.sonar.station_y_m = 0.0f;
+  params.sonar.sigma_range_m = 0.3f;
+  params.sonar.sigma_bearing_rad = 0.017453292f;
+  params.waypoints.switch_m = 12.0f;
+  Chip pilot(params);
+  const float x = numbers.number();
+  const float y = numbers.number();
+  numbers.write(pilot.start(kPlan, 4, x, y, numbers.number()));
+  const std::uint32_t steps = numbers.word();
+  for (std::uint32_t k = 0; k < steps; ++k) {
+    typename Chip::Readings now;
+    now.heard = static_cast<std::uint8_t>(numbers.word());
+    now.heading_rad = numbers.number();
+    now.pitch_rad = numbers.number();
+    now.pitch_rate_rad_s = numbers.number();
+    now.yaw_rate_rad_s = numbers.number();
+    now.speed_m_s = numbers.number();
+    now.sway_m_s = numbers.number();
+    now.depth_m = numbers.number();
+    Vector<float, 2> fix;
+    numbers.read(fix);
+    const float age = numbers.number();
+
+    const Status predicted = pilot.predict(now, 0.1f);
+    const bool asks = pilot.wants_fix();
+    if (asks) pilot.asked();
+    Status corrected = Status::kOk;
+    float nis = math::quiet_nan();
+    if (!math::is_nan(age)) {
+      const typename Chip::Report report = pilot.update(fix, age);
+      corrected = report.status;
+      if (corrected == Status::kOk) nis = report.nis;
+    }
+    TorpedoCommand<float> command;
+    const Status steered = pilot.steer(command);
+
+    numbers.write(pilot.filter().x());
+    for (int i = 0; i < 4; ++i) {
+      for (int j = 0; j <= i; ++j) numbers.write(pilot.filter().belief().P(i, j));
+    }
+    numbers.write(nis);
+    numbers.write(pilot.heading_rad());
+    numbers.write(pilot.cross_track_m());
+    numbers.write(command.rudder_rad);
+    numbers.write(command.stern_planes_rad);
+    numbers.write(command.propeller_rev_s);
+    numbers.write(
+        static_cast<std::uint32_t>(predicted) | static_cast<std::uint32_t>(corrected) << 8 |
+        static_cast<std::uint32_t>(steered) << 16 | static_cast<std::uint32_t>(pilot.mode()) << 24);
+    numbers.write(static_cast<std::uint32_t>(pilot.path().leg()) | (asks ? 256u : 0u) |
+                  pilot.implausible() << 16);
+  }
+}
+
 /// Reads one record from the stream and writes its trace.
 template <class Stream>
 void replay(Stream& stream) {
@@ -315,6 +380,7 @@ void replay(Stream& stream) {
   if (kind == kMission) MissionReplay<Stream>(numbers).run();
   if (kind == kHull) replay_hull_record(numbers);
   if (kind == kRov) replay_rov(numbers);
+  if (kind == kPilot) replay_pilot(numbers);
 }
 
 }  // namespace parity

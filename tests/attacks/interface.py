@@ -342,16 +342,17 @@ def suits(name: str, process: auvest.ProcessModel) -> bool:
     return True
 
 
+#: Calls that leave the object as it was, and are never refused.
+KEEPING = (
+    "f.restore(f.save())",
+    "f = pickle.loads(pickle.dumps(f))",
+    "f = copy.deepcopy(f)",
+    "repr(f)",
+)
+
+
 def kept(rng: random.Random) -> str:
-    """A call that leaves the object as it was."""
-    return rng.choice(
-        (
-            "f.restore(f.save())",
-            "f = pickle.loads(pickle.dumps(f))",
-            "f = copy.deepcopy(f)",
-            "repr(f)",
-        )
-    )
+    return rng.choice(KEEPING)
 
 
 # ---- What must hold.
@@ -472,6 +473,8 @@ class Interface:
             require_answer(f, call, answer)
         else:
             counts["refused"] += 1
+            if call in KEEPING:
+                raise Failed(f"{name}: its own state is refused", f"{call}: {error!r}")
             stays = not isinstance(error, auvest.FilterError) or error.step is None
             if stays and state_of(f) != before:
                 raise Failed(f"{name}: changed by a refusal", f"{call}: {error!r}")

@@ -14,6 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
+from auvest._core import PilotMode, Status
 from firmware.parity.targets import VEHICLE_TARGETS
 from firmware.parity.vehicle import NAMES, all_records, first_steps
 from tests.parity import vehicle_python_leg
@@ -28,6 +29,7 @@ SHORT = 60
 
 MISSIONS = tuple(name for name in NAMES if name.startswith("mission"))
 HULLS = tuple(name for name in NAMES if name.startswith("hull"))
+SOUND = tuple(name for name in NAMES if name != "pilot")  # in which nothing is refused
 
 
 @pytest.fixture(scope="module")
@@ -118,6 +120,11 @@ def test_the_rov_in_python_has_the_bits_of_the_host(records, traces):
     np.testing.assert_array_equal(found, wanted["x"])
 
 
+def test_the_pilot_in_python_has_the_bits_of_the_host(records, traces):
+    wanted = traces(REFERENCE, "pilot")
+    same(wanted, vehicle_python_leg.pilot_through(records["pilot"]), *vehicle_python_leg.PILOTED)
+
+
 # ---- The records do what they are for ------------------------------------------------------------
 
 
@@ -129,7 +136,25 @@ def test_a_build_that_fuses_products_is_noticed(name, records, replay, traces):
     assert first_difference(wanted, record.trace_of(fused)) is not None
 
 
-@pytest.mark.parametrize("name", NAMES)
+def test_the_pilot_meets_what_its_record_is_for(traces):
+    rows = traces(REFERENCE, "pilot")
+    assert not rows["predicted"].any()
+    assert not rows["steered"].any()
+    modes = [PilotMode(mode) for mode in rows["mode"]]
+    assert set(modes) == {PilotMode.under_way, PilotMode.silent, PilotMode.finished}
+    changes = [k for k in range(1, len(modes)) if modes[k] != modes[k - 1]]
+    # A gyro and a depth that are silent for 2.5 s stop it after one; compass and log are stood in
+    # for. Its plan of 280 m, less the corners that it cuts, ends after 186 s.
+    assert changes[:4] == [170, 185, 340, 355]
+    assert len(changes) == 5
+    assert 1800 < changes[4] < 1900
+    assert set(rows["leg"]) == {0, 1, 2}
+    refusals = {Status(int(code)) for code in set(rows["corrected"])}
+    assert refusals == {Status.ok, Status.time_backwards, Status.bad_parameter}
+    assert rows["implausible"][-1] == 5
+
+
+@pytest.mark.parametrize("name", SOUND)
 def test_nothing_is_refused_and_every_number_is_one(name, traces):
     rows = traces(REFERENCE, name)
     assert not rows["status"].any()

@@ -10,8 +10,16 @@ from __future__ import annotations
 import numpy as np
 
 from auvest import RangeBearing, RejectionStreak, RobustEkf, SpeedHeadingCurrent, vehicle
+from auvest._core import Status
 from auvest.simulation import mission
-from firmware.parity.vehicle import PERIOD_S, HullRecord, MissionRecord, RovRecord
+from auvest.simulation.vehicle_in_the_loop import chip_mission, new_pilot
+from firmware.parity.vehicle import (
+    PERIOD_S,
+    HullRecord,
+    MissionRecord,
+    PilotRecord,
+    RovRecord,
+)
 from tests.parity.python_leg import bits
 
 #: What `fly` gives of a trace's row.
@@ -73,6 +81,37 @@ def filter_beside(record: MissionRecord, headings: np.ndarray) -> np.ndarray:
 
 def _recovery(record: MissionRecord) -> RejectionStreak | None:
     return RejectionStreak(rejections=record.rejections) if record.rejections else None
+
+
+#: Fields of a trace that `pilot_through` gives.
+PILOTED = ("x", "P", "nis", "heading", "cross", "command", "predicted", "corrected", "steered")
+PILOTED += ("mode", "leg", "asks", "implausible")
+
+
+def pilot_through(record: PilotRecord) -> np.ndarray:
+    """Let the pilot hear a record, dtype of its trace."""
+    pilot = new_pilot(chip_mission(), mission.LAWNMOWER[:4])
+    pilot.start(*record.mission.start_m, 0.0)
+    rows = np.zeros(len(record.rows), record.trace)
+    for told, row in zip(record.rows, rows, strict=True):
+        row["predicted"] = int(pilot.predict(told["values"], int(told["heard"]), PERIOD_S))
+        row["asks"] = pilot.wants_fix()
+        if row["asks"]:
+            pilot.asked()
+        row["nis"] = bits(np.float32(np.nan))
+        if not np.isnan(told["age"]):
+            status, nis = pilot.update(*told["fix"], told["age"])
+            row["corrected"] = int(status)
+            if status == Status.ok:
+                row["nis"] = bits(np.float32(nis))
+        status, *command = pilot.steer()
+        row["steered"], row["mode"] = int(status), int(pilot.mode)
+        row["x"], row["P"] = bits(pilot.x), bits(pilot.P[np.tril_indices(4)])
+        row["command"] = bits(np.array(command, np.float32))
+        row["heading"] = bits(np.float32(pilot.heading_rad))
+        row["cross"] = bits(np.float32(pilot.cross_track_m))
+        row["leg"], row["implausible"] = pilot.leg, pilot.implausible
+    return rows
 
 
 def move(record: HullRecord) -> np.ndarray:

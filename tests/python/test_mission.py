@@ -171,3 +171,26 @@ def test_the_command_refuses_what_cannot_fly():
     done = CliRunner().invoke(app, ["simulate", "mission", "--filter", "ukf"])
     assert done.exit_code == 2
     assert "guidance 'crab' needs" in done.stderr
+
+
+def test_the_rows_of_the_table_are_those_of_the_core():
+    """Filter, noise, law and policy of each; the prototype's own filter has its noise, 0.02."""
+    rows = {name: mission.source(name, "circle", interval_s=0.7) for name in mission.SOURCES}
+    assert len(rows) == 13
+    assert {row.estimate for row in rows.values()} == set(mission.ESTIMATES)
+    fixed = FixedInterval(interval_s=0.7)
+    assert sum(row.interval == fixed for row in rows.values()) == 11
+    assert rows["aukf_law"].interval == MahalanobisInterval(initial_s=0.5, min_s=0.1, max_s=1.105)
+    assert mission.source("aukf_law", "lawnmower").interval.max_s == 1.18
+    assert rows["ukf_default_psd"].acceleration_psd == 1e-5
+    for name, row in rows.items():
+        assert row.usbl_outliers == (0.05 if name.endswith("outliers") else 0)
+        assert row.guidance == ("adaptive" if name in ADAPTIVE else "crab")
+        assert (row.recovery is None, row.kernel is None) == 2 * (not name.startswith("robust"),)
+        prototype = name.startswith("model_aided")
+        assert row.model_position == (0.02 if prototype else Mission().model_position)
+    assert mission.source("ukf", "circle", runs=3, acceleration_psd=2e-4).acceleration_psd == 2e-4
+
+
+ADAPTIVE = ("truth", "fixes", "ukf", "ukf_outliers", "ukf_default_psd", "aukf_law", "aukf_budget")
+ADAPTIVE += ("model_aided",)

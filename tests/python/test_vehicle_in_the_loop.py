@@ -244,6 +244,7 @@ def test_a_board_at_a_port_flies_to_the_end(call: Callable[..., tuple[int, dict,
     assert values["awake_share_simulated"] is None
     # The wall clock's few microseconds are the delay: what is left is the rounding.
     assert abs(values["difference_m"]) < 0.005
+    assert values["largest_difference_m"] == abs(values["difference_m"])  # of one run
     assert Path(document["files"]["figure"]).stat().st_size > 10_000
     rows = Path(document["files"]["samples"]).read_text().splitlines()
     assert len(rows) > 4000

@@ -99,12 +99,7 @@ def command(
         refuse_given(ctx, ("runs", "workers"), "belongs to --simulator.")
     with terminal.usage_errors():
         plan = chip_mission(
-            current_m_s=current,
-            current_rad=math.nan if current_direction is None else math.radians(current_direction),
-            compass_bias_rad=math.radians(compass_bias),
-            usbl_outliers=outliers,
-            usbl_latency_s=latency,
-            usbl_dropout=dropout,
+            **options.sea(current, current_direction, compass_bias, outliers, latency, dropout),
             runs=runs,
             seed=seed,
         )
@@ -257,6 +252,7 @@ def measures(flights: list[ChipFlight], beside: dict[str, Floats]) -> dict[str, 
     }
     for name in ("settled_rms_m", "desk_settled_rms_m", "difference_m", "all_rms_m"):
         numbers[name], numbers[f"{name}_se"] = mean_and_error(beside[name])
+    numbers["largest_difference_m"] = float(np.abs(beside["difference_m"]).max())
     for name in ("by_rounding_m", "by_delay_m"):
         numbers[name], _ = mean_and_error(beside[name])
     delays = np.concatenate([chip.vehicle.delays_s for chip in flights])
@@ -348,6 +344,7 @@ def _table(values: dict[str, Any], source: str) -> Table:
         ("cross-track RMS, settled / m", with_error("settled_rms_m"), "from 50 m into a leg"),
         ("the same without a chip / m", with_error("desk_settled_rms_m"), "same seeds, float32"),
         ("difference / m", with_error("difference_m"), "chip and line"),
+        ("  largest of a run / m", f"{values['largest_difference_m']:.4f}", "without its sign"),
         ("  of text rounded / m", f"{values['by_rounding_m']:+.4f}", "alone, on the desk"),
         (
             "  of the command's delay / m",
@@ -375,7 +372,7 @@ def _table(values: dict[str, Any], source: str) -> Table:
         ("lines damaged", f"{values['damaged_lines']}", "on their way from the board"),
     ]
     if simulated:
-        rows.insert(9, ("deepest stack / B", f"{values['stack_bytes']}", ""))
+        rows.insert(10, ("deepest stack / B", f"{values['stack_bytes']}", ""))
     title = (
         f"{source}: {values['finished_runs']} of {values['runs']} runs to the end, "
         f"{values['samples']} samples"

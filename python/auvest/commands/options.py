@@ -164,3 +164,22 @@ FixDropout = Annotated[
 CompassBias = Annotated[
     float, option(WORLD, "Its standard deviation, degrees.", "--compass-bias", check=not_negative)
 ]
+
+
+def sea(
+    current: float,
+    direction: float | None,
+    compass_bias: float,
+    outliers: float,
+    latency: float,
+    dropout: float,
+) -> dict[str, float]:
+    """Give the values of these options as a mission takes them: angles in radians."""
+    return {
+        "current_m_s": current,
+        "current_rad": math.nan if direction is None else math.radians(direction),
+        "compass_bias_rad": math.radians(compass_bias),
+        "usbl_outliers": outliers,
+        "usbl_latency_s": latency,
+        "usbl_dropout": dropout,
+    }

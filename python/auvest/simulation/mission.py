@@ -26,10 +26,8 @@ from auvest._fields import (
     positive,
 )
 from auvest.intervals import (
-    CovarianceBudget,
     FixedInterval,
     IntervalPolicy,
-    MahalanobisInterval,
     core_interval,
 )
 from auvest.kernels import Kernel, KernelName, RejectionStreak, Unit, as_kernel, core_kernel
@@ -332,23 +330,9 @@ def settings(mission: Mission) -> dict[str, Any]:
 
 # ---- The rows of the closed-loop table -----------------------------------------------------------
 
-#: What guidance runs on, by the name of the row.
-SOURCES = (
-    "truth",
-    "truth_crab",
-    "fixes",
-    "ukf",
-    "ukf_default_psd",
-    "ukf_outliers",
-    "aukf_law",
-    "aukf_budget",
-    "model_aided",
-    "model_aided_crab",
-    "model_aided_outliers",
-    "robust_model_aided",
-    "robust_model_aided_outliers",
-)
-_DEFAULT_PSD = 1e-5
+#: What guidance runs on, by the name of the row (``cpp/simulation/mission_scenario.hpp``).
+SOURCES: tuple[str, ...] = tuple(_core.mission_sources())
+_INTERVALS = {kind.__name__: kind for kind in IntervalPolicy.__args__}
 
 
 def source(name: str, track: TrackKind, *, interval_s: float = 0.5, **options: Any) -> Mission:
@@ -372,29 +356,9 @@ def source(name: str, track: TrackKind, *, interval_s: float = 0.5, **options: A
     """
     as_kind("name", name, SOURCES)
     as_kind("track", track, TRACKS)
-    estimates: dict[str, Estimate] = {"truth": "truth", "fixes": "fixes", "ukf": "ukf"}
-    head = name.removeprefix("robust_").partition("_")[0]
-    values: dict[str, Any] = {
-        "track": track,
-        "estimate": "ukf" if head == "aukf" else estimates.get(head, "model-aided"),
-        "interval": FixedInterval(interval_s=interval_s),
-    }
-    crab = name in ("truth_crab", "model_aided_crab", "model_aided_outliers") or (
-        name.startswith("robust_")
-    )
-    values["guidance"] = "crab" if crab else "adaptive"
-    if name.endswith("_outliers"):
-        values["usbl_outliers"] = 0.05
-    if name == "ukf_default_psd":
-        values["acceleration_psd"] = _DEFAULT_PSD
-    if name == "aukf_law":
-        most = 1.18 if track == "lawnmower" else 1.105
-        values["interval"] = MahalanobisInterval(initial_s=0.5, min_s=0.1, max_s=most)
-    if name == "aukf_budget":
-        budget = 1.155 if track == "lawnmower" else 1.09
-        values["interval"] = CovarianceBudget(
-            position_sigma_m=budget, initial_s=0.5, min_s=0.1, max_s=2.0
-        )
-    if name.startswith("robust_"):
-        values.update(kernel="igg", recovery=RejectionStreak())
+    values = _core.mission_source(name, track, interval_s)
+    kind, params = values["interval"]
+    values["interval"] = _INTERVALS[kind](**params)
+    robust = values.pop("kernel")
+    values.update(kernel="igg" if robust else None, recovery=RejectionStreak() if robust else None)
     return Mission(**{**values, **options})
