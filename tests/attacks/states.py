@@ -277,11 +277,12 @@ def refused_from_start(f: Any, status: auvest.Status) -> bool:
             drive(fresh, range(6, 9))
         except auvest.FilterError:
             return True
-        except ValueError:
-            return False
+        except ValueError:  # no filter may start there
+            return status == auvest.Status.far_from_origin
         return False
     # Masters and particles beyond the range of the numbers say so.
-    return status in (auvest.Status.overflow, auvest.Status.not_finite)
+    beyond = ("overflow", "not_finite", "far_from_origin")
+    return status.name in beyond
 
 
 ATTACK = States()
