@@ -515,7 +515,7 @@ class GaussianFilter:
                 _require_rows("reference", track, count)
         elif reference is not None:
             raise TypeError("reference must be None: this filter has no interval policy")
-        record = {
+        record: dict[str, Any] = {
             "z": rows,
             "dt": np.full(count, np.nan, self._dtype)
             if dt is None
@@ -896,7 +896,7 @@ class GaussianFilter:
         *,
         dt: Any = None,
         z: Any = None,
-        sensor: str | MeasurementModel | None = None,
+        sensor: Any = None,
         place: Any = None,
     ) -> str:
         """Explain a status that says less than is known here; empty for the others."""
@@ -909,7 +909,7 @@ class GaussianFilter:
         if status == Status.impossible_range:
             name, model = self._named_sensor(sensor)
             limits = ""
-            if hasattr(model, "smallest_range_m"):
+            if hasattr(model, "smallest_range_m") and hasattr(model, "largest_range_m"):
                 limits = (
                     f"; its ranges are {model.smallest_range_m:g} to {model.largest_range_m:g} m"
                 )
