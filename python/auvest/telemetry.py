@@ -139,8 +139,6 @@ def _number(name: str, cell: str) -> float:
         return struct.unpack(">f", bytes.fromhex(cell))[0]
     if cell in ("ovf", "nan"):  # what Arduino prints where there is no number
         return math.nan
-    if not _DECIMALS.fullmatch(
-        cell
-    ):  # float() also takes what no sketch sends: 1_0, foreign digits
+    if not _DECIMALS.fullmatch(cell):  # float() takes 1_0 and foreign digits, too
         raise ValueError(cell)
     return float(cell)

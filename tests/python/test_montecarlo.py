@@ -281,14 +281,16 @@ def test_a_folder_that_is_no_store_is_refused(tmp_path: Path) -> None:
 
 
 def test_no_link_in_a_store_is_followed(tmp_path: Path) -> None:
-    (tmp_path / "victim").write_text("precious")
+    victim = tmp_path / "victim.npz"
     options: dict[str, Any] = {"chunk": 5, "store": tmp_path / "store", "settings": {}}
     whole = montecarlo.run(task, 10, **options)
     (tmp_path / "store" / "0-4.npz").unlink()
-    (tmp_path / "store" / "0-4.npz").symlink_to(tmp_path / "victim")
+    np.savez(victim, **{name: 0 * column[:5] for name, column in whole.items()})  # type: ignore[arg-type]
+    precious = victim.read_bytes()
+    (tmp_path / "store" / "0-4.npz").symlink_to(victim)
     again = montecarlo.run(task, 10, **options)
     assert again["value"].tobytes() == whole["value"].tobytes()
-    assert (tmp_path / "victim").read_text() == "precious"
+    assert victim.read_bytes() == precious
     (tmp_path / "link").symlink_to(tmp_path / "store")
     with pytest.raises(ValueError, match="is a link"):
         montecarlo.run(task, 10, **{**options, "store": tmp_path / "link"})
