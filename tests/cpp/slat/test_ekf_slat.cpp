@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 
 #include "close.hpp"
+#include "paper.hpp"
 
 #include <Eigen/LU>
 #include <cmath>
@@ -25,6 +26,7 @@ using auvest::SlatScenario;
 using auvest::Status;
 using auvest::Vector;
 using auvest::math::Random;
+using slat_test::OpenEkf;
 
 template <class Scalar>
 using Compass = auvest::CompassMotion<Scalar>;

@@ -72,9 +72,9 @@ AUVEST_INLINE void keep_definite(const Vector<Value, U>& before, const Matrix<Va
                                  Matrix<Value, N, N>& P) {
   static_assert(U == N - O, "the states that are not seen");
   using math::any;
-  math::Mask<Value> shrunk = before(0) > Value(2) * P(O, O);
+  math::Mask<Value> shrunk = Value(4) * before(0) > Value(5) * P(O, O);
   AUVEST_UNROLL
-  for (int i = 1; i < U; ++i) shrunk = shrunk || before(i) > Value(2) * P(O + i, O + i);
+  for (int i = 1; i < U; ++i) shrunk = shrunk || Value(4) * before(i) > Value(5) * P(O + i, O + i);
   if (any(shrunk)) detail::raise_lost_pivots<O>(before, slope, P);
 }
 

@@ -92,12 +92,11 @@ class EkfSlat : public SlatFilter<Motion_, Masters, Safeguards_> {
     Scalar log_likelihood = log_likelihood_;
     int who[Masters];
     Model::identify(belief, echoes, count, masters_, sonar, params_.gate, who);
-    for (int s = 0; s < count; ++s) {
+    bool reborn[Masters];                             // after all others have told of the slave
+    for (int s = 0; s < count && s < Masters; ++s) {  // count <= Masters
       const int known = echoes[s].master;
-      if (known != kUnknownMaster && safeguards.forgotten(known, params_)) {
-        rebirth(echoes[s], sonar, belief, safeguards);
-        continue;
-      }
+      reborn[s] = known != kUnknownMaster && safeguards.forgotten(known, params_);
+      if (reborn[s]) continue;
       Score<Scalar> score;
       const SlaveBelief slave = Model::template part<kPose>(belief, 0);
       if (!Model::correct(echoes[s].z, who[s], sonar, params_.gate, belief, score))
@@ -110,10 +109,15 @@ class EkfSlat : public SlatFilter<Motion_, Masters, Safeguards_> {
       if (known == kUnknownMaster) continue;
       if (!(params_.gate > Scalar(0) && score.nis > params_.gate)) {
         safeguards.accepted(known);
-      } else if (safeguards.refused(known, place_of(sonar, echoes[s].z, slave.x), echoes[s].z(0),
-                                    sonar.params, params_)) {
-        rebirth(echoes[s], sonar, belief, safeguards);
+      } else {
+        reborn[s] = safeguards.refused(known, place_of(sonar, echoes[s].z, slave.x), echoes[s].z(0),
+                                       sonar.params, params_);
       }
+    }
+    for (int s = 0; s < count && s < Masters; ++s) {
+      if (!reborn[s]) continue;
+      Model::give_rebirth(echoes[s].z, echoes[s].master, sonar, params_, belief);
+      safeguards.reborn(echoes[s].master);
     }
     belief_ = belief;
     nis_ = nis;
@@ -143,12 +147,6 @@ class EkfSlat : public SlatFilter<Motion_, Masters, Safeguards_> {
   using Frame::log_likelihood_;
   using Frame::masters_;
   using Frame::safeguards_;
-
-  void rebirth(const Echo<Scalar>& echo, const Sonar<Scalar>& sonar, BeliefType& belief,
-               Safeguards_& safeguards) const {
-    Model::give_rebirth(echo.z, echo.master, sonar, params_, belief);
-    safeguards.reborn(echo.master);
-  }
 
   Model model_;
   Params params_;

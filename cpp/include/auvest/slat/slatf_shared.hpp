@@ -168,6 +168,7 @@ class SlatfShared : public SlatfSharedFrame<Motion_, Masters, Resampling_, Safeg
       if (safeguards_.forgotten(echoes[s].master, params_)) continue;
       if (heard > 0) {
         this->log_likelihood_ = this->log_likelihood_ + normalise<Lanes>(set_).log_sum;
+        find_centre();
       }
       ++heard;
       correct(echoes[s], sonar, s, refused);
@@ -188,6 +189,7 @@ class SlatfShared : public SlatfSharedFrame<Motion_, Masters, Resampling_, Safeg
         rebirth(echo, sonar);
       }
     }
+    find_centre();
     return Status::kOk;
   }
 
@@ -368,7 +370,6 @@ class SlatfShared : public SlatfSharedFrame<Motion_, Masters, Resampling_, Safeg
   /// Echo number s of a ping moves and weighs all particles, and narrows the covariance.
   AUVEST_OUTLINE void correct(const Echo<Scalar>& echo, const Sonar<Scalar>& sonar, int s,
                               Refused& refused) {
-    find_centre();
     const Seen seen(centre_.P, echo.master);
     const Scalar limit = params_.gate > Scalar(0) ? params_.gate : Scalar(1e35);
     for_each_group([&](int i) { correct(i, echo, sonar, s, seen, limit, refused); });
