@@ -127,6 +127,7 @@ def positions(count=10_000):
     turn = 0.01 * np.arange(count)
     track = np.column_stack([0.2 + 10 * np.cos(turn), 2 + 0.05 * np.sin(turn)])
     z = auvest.RangeBearing().h(track) + rng.normal(size=(count, 2)) * [0.05, 0.01]
+    z[:, 0] = np.abs(z[:, 0])  # no sonar reports a range below 0
     z[:, 1] = (z[:, 1] + np.pi) % (2 * np.pi) - np.pi
     return z
 

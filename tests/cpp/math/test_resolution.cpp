@@ -16,7 +16,7 @@ void check_against_the_next_number() {
   const Scalar infinity = std::numeric_limits<Scalar>::infinity();
   int coarse = 0;
   int fine = 0;
-  for (int exponent = -30; exponent <= 90; ++exponent) {
+  for (int exponent = -30; exponent <= 62; ++exponent) {
     for (const double mantissa : {1.0, 1.001, 1.5, 1.999}) {
       for (const double sign : {1.0, -1.0}) {
         const Scalar x = Scalar(sign * std::ldexp(mantissa, exponent));
@@ -35,8 +35,8 @@ void check_against_the_next_number() {
       }
     }
   }
-  CHECK(coarse > 500);
-  CHECK(fine > 500);
+  CHECK(coarse > 200);
+  CHECK(fine > 200);
 }
 
 }  // namespace

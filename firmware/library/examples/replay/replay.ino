@@ -20,7 +20,14 @@ auvest::Ukf<Process> make_ukf() {
 }
 
 Filter filter(make_ukf());
-const auvest::RangeBearing<float, 6> sonar;
+
+auvest::RangeBearing<float, 6> make_sonar() {
+  auvest::RangeBearing<float, 6> made;
+  made.params.lift_smallest();  // simulated: the noise is not cut off at a range of 0
+  return made;
+}
+
+const auvest::RangeBearing<float, 6> sonar = make_sonar();
 
 float stored(const uint32_t* bits) { return auvest::math::from_bits(pgm_read_dword(bits)); }
 
