@@ -84,8 +84,8 @@ TEST_CASE("smooth paths: what the hull can turn it flies, a corner it cannot") {
   CAPTURE(on_dubins);
   CAPTURE(on_spline);
   CAPTURE(on_corners);
-  // Where the curvature jumps by 1/R the rate follows it by about a second (the reference's gain
-  // and Nomoto's time constant): 1.5 m on, the path has turned away by 1.5^2 / (2 R).
+  // Where the curvature jumps by 1/R the heading lags behind by two seconds at most (reference, fin
+  // and Nomoto's second): U/R 2 s, and a look-ahead of 10 m makes 1.5 m of that.
   CHECK(on_dubins < 1.5);
   CHECK(on_spline < 1.5);
   CHECK(on_corners > 8);
