@@ -158,7 +158,7 @@ fuzz: setup-dev ## libFuzzer on the filters: SECONDS=15, PRECISION=float
 	    -D CMAKE_CXX_FLAGS_RELEASE='-O1 -g1' -D CMAKE_CXX_COMPILER=clang++
 	cmake --build build/fuzz/$(FUZZ_BUILD) --target fuzz_$(PRECISION)
 	build/fuzz/$(FUZZ_BUILD)/tests/attacks/fuzz_$(PRECISION) -artifact_prefix=build/fuzz/ \
-	    -max_total_time=$(SECONDS) -timeout=60 -print_final_stats=1 -verbosity=0
+	    -max_total_time=$(SECONDS) -timeout=60 -print_final_stats=1 -print_funcs=0 -verbosity=0
 
 # ---- Measure -------------------------------------------------------------------------------------
 

@@ -74,6 +74,8 @@ STEPS.update(pilot_steer=1_000, pilot_predict=1_000, pilot_update=199)  # one fi
 
 #: Particles of SlatfJoint: whole blocks that the RAM holds beside the stack.
 JOINT_PARTICLES = 32
+#: Of SlatfShared, which takes 36 bytes for each.
+SHARED_PARTICLES = 96
 
 #: Echoes that SLATF and its relatives are measured over, and the seconds between two of them.
 ECHOES = 25
@@ -138,9 +140,29 @@ def _filter(kind: str, arguments: str, step: str) -> Program:
     return "filter", {"FILTER": kind, "ARGUMENTS": arguments, "STEP": step}
 
 
-def _slat(kind: str, particles: int = 0, master: str = "PiecewiseAcceleration<float>") -> Program:
-    """Give a filter that localises and tracks, with particles or, with 0 of them, without."""
+#: What follows the number of masters where a filter is the paper's: nothing guards it.
+_PLAIN = {
+    "Slatf1": ", auvest::SystematicResampling, auvest::OneLane<float>, auvest::NoSafeguards",
+    "SlatfJoint": ", auvest::SystematicResampling, auvest::NoSafeguards",
+    "EkfSlat": ", auvest::NoSafeguards",
+}
+_PLAIN["Slatf2"] = _PLAIN["Slatf1"]
+
+
+def _slat(
+    kind: str,
+    particles: int = 0,
+    master: str = "PiecewiseAcceleration<float>",
+    *,
+    guarded: bool = False,
+) -> Program:
+    """Give a filter that localises and tracks, with particles or, with 0 of them, without.
+
+    ``guarded``: as it comes, with a gate and recovery of a lost master.
+    """
     places = {"KIND": kind, "MASTER": master, "STORAGE": "", "PARTICLES": ""}
+    places["REST"] = "" if guarded else _PLAIN[kind]
+    places["GATE"] = "13.8f" if guarded else "0"
     if particles:
         places["STORAGE"] = f"Filter::Storage<{particles}> particles;"
         places["PARTICLES"] = ", particles"
@@ -212,6 +234,7 @@ _PROGRAMS: Mapping[str, Program] = {
     "slatf1": _slat("Slatf1", AVR_PARTICLES),
     "slatf2": _slat("Slatf2", AVR_PARTICLES),
     "slatf_joint": _slat("SlatfJoint", JOINT_PARTICLES),
+    "slatf_shared": _slat("SlatfShared", SHARED_PARTICLES, guarded=True),
     "ekf_slat": _slat("EkfSlat"),
     "ekf_slat_imm": _slat("EkfSlat", master=_IMM),
 }
@@ -252,7 +275,9 @@ def _record(program: str) -> bytes:
     )
     start = np.concatenate([filter_.x, np.diagonal(filter_.P)])
     result = simulate(filter_, scenario, workers=1)
-    rows = np.hstack([result.z[0], result.truth[0]])
+    z = result.z[0].copy()
+    z[:, 0] = np.abs(z[:, 0])  # no sonar reports a range below 0; the noise of the scenario does
+    rows = np.hstack([z, result.truth[0]])
     end = np.full(4, np.nan)
     return np.concatenate([start, rows.ravel(), end]).astype("<f4").tobytes()
 
@@ -547,9 +572,12 @@ def page(rows: list[Row]) -> str:
         "bearing occur. `robust_ekf_predict` and `robust_ekf_update`: dead reckoning by speed and",
         "heading and one range, M-estimation EKF of two states with IGG and the recovery, a range",
         "of ten an outlier, and a lock-out half-way; the same program, its two halves.",
+        "`unknown_start_predict` and `unknown_start_update`: the same from a sigma of 100 km, with",
+        "16 components (a ring at the start and after the lock-out); the medians are with one.",
         f"`slatf1` and `slatf2`: N = {AVR_PARTICLES}, one master, two predictions and one echo,",
         f"{ECHOES} times at the beginning of the paper's scenario; `slatf_joint`: the same with",
-        f"N = {JOINT_PARTICLES}; `ekf_slat` and, with the three models of an `Imm` for the master,",
+        f"N = {JOINT_PARTICLES}; `slatf_shared`: with one covariance, N = {SHARED_PARTICLES},",
+        "a gate and recovery; `ekf_slat` and, with the three models of an `Imm` for the master,",
         "`ekf_slat_imm`: the same without particles. The examples: `first_steps` is its whole run,",
         "serial text included; `replay` counts predict, update and feedback by the chip's timer;",
         "`tracking_loop` counts the cycles awake between two samples, `slave_tracking` those",
@@ -632,7 +660,8 @@ def slatf_page(rows: list[Row]) -> list[str]:
         "|---|---:|---:|---:|",
     ]
     counts = dict.fromkeys(("slatf1", "slatf2", "slave_tracking"), AVR_PARTICLES)
-    counts.update(slatf_joint=JOINT_PARTICLES, ekf_slat=0, ekf_slat_imm=0)
+    counts.update(slatf_joint=JOINT_PARTICLES, slatf_shared=SHARED_PARTICLES)
+    counts.update(ekf_slat=0, ekf_slat_imm=0)
     for name, particles in counts.items():
         cycles = by_name[name].cycles_median
         if cycles is None:

@@ -42,12 +42,16 @@ P0 = np.array([25.0, 25.0, 4.0, 4.0, 0.1, 0.1], np.float32)
 
 PROGRAMS = ("slat_step", "slat_step_sse2", "slat_step_avx2", "slat_step_avx512f")
 NOT_ON_THIS_PROCESSOR = 77
+#: Versions of the program that are no SLATF 1.0 or 2.0.
+JOINT = {3: "auvest SlatfJoint, a covariance per particle", 4: "auvest SlatfJoint, one covariance"}
 
 PASSES = 3  # at least, of which the fastest counts
 
 TARGET_NUMBA = {100: 10.0, 10_000: 14.0}  # in double
 TARGET_NUMPY = 60.0  # at 100 particles
 TARGET_VERSION_2 = 2.0
+TARGET_SHARED = 3.0  # times as fast as SlatfJoint with a covariance per particle
+TARGET_SHARED_PER_PARTICLE = 1.0  # of SLATF 2.0 in the same lanes
 TARGET_GROWTH = 1.3  # per particle, from 1,000 to 100,000 particles
 
 PAGE = """# Speed of SLATF
@@ -390,6 +394,9 @@ def main() -> int:
                     source = few if particles > 1000 else record
                     time_ns = program_time(widest, source, version, particles, passes, None)
                     times.setdefault(key, []).append(time_ns)
+            for version, name in JOINT.items():
+                time_ns = program_time(widest, few, version, 100, PASSES, None)
+                times.setdefault((f"{name}, {names[-1]}", 100), []).append(time_ns)
             for particles in (100, 10_000):
                 for name in names[:-1]:
                     time_ns = program_time(
@@ -429,6 +436,20 @@ def main() -> int:
             target=TARGET_VERSION_2,
         )
         for n in (100, 1000)
+    ]
+    joint, shared = ((f"{name}, {names[-1]}", 100) for name in JOINT.values())
+    checks += [
+        Check(
+            "a covariance per particle / one for all, N = 100",
+            ratio(joint, shared),
+            target=TARGET_SHARED,
+        ),
+        Check(
+            "one covariance for all / SLATF 2.0, N = 100",
+            ratio(shared, (second, 100)),
+            "<=",
+            target=TARGET_SHARED_PER_PARTICLE,
+        ),
     ]
     checks.append(
         Check(

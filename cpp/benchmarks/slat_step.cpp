@@ -4,9 +4,10 @@
 //     slat_step RECORD VERSION PARTICLES REPEATS [ESTIMATES]
 //
 // RECORD: float32 numbers, runs x 200 steps x (speed, yaw rate, range, bearing), native byte order.
-// VERSION: 1 or 2. Goes through all runs REPEATS times and prints the processor's time of the
-// fastest pass in nanoseconds per particle and step; writes the estimates of the last pass to
-// ESTIMATES: runs x 200 x (master x, y, slave x, y). `make bench` calls it (slat_speed.py).
+// VERSION: 1 or 2, of SLATF; 3: SlatfJoint, particle by particle; 4: SlatfShared. Without a gate:
+// the paper. Goes through all runs REPEATS times and prints the processor's time of the fastest
+// pass in nanoseconds per particle and step; writes the estimates of the last pass to ESTIMATES:
+// runs x 200 x (master x, y, slave x, y). `make bench` calls it (slat_speed.py).
 #if defined(AUVEST_SIMD_ARCH)
 #include "auvest/particles/simd_lanes.hpp"  // before the filters, which find its functions
 #endif
@@ -43,6 +44,11 @@ bool processor_has_lanes() { return true; }
 
 using Motion = auvest::UnicycleMotion<float>;
 using Master = auvest::EulerAcceleration<float>;
+
+using First = auvest::Slatf1<Motion, Master, 1, auvest::SystematicResampling, Lanes>;
+using Second = auvest::Slatf2<Motion, Master, 1, auvest::SystematicResampling, Lanes>;
+using Joint = auvest::SlatfJoint<Motion, Master, 1>;
+using Shared = auvest::SlatfShared<Motion, Master, 1, auvest::SystematicResampling, Lanes>;
 
 constexpr int kSteps = 200;
 constexpr float kSeconds = 0.5f;
@@ -103,6 +109,17 @@ void start(Filter& filter, int particles, auvest::math::Random& random) {
   }
 }
 
+template <class Filter>
+void read_positions(const Filter& filter, Vector<float, 2>& master, Vector<float, 2>& slave) {
+  const typename Filter::Positions mean = filter.positions();
+  master = mean.masters[0];
+  slave = mean.slave;
+}
+void read_positions(const Joint& filter, Vector<float, 2>& master, Vector<float, 2>& slave) {
+  master = filter.master(0).x.head<2>();
+  slave = filter.slave().x.head<2>();
+}
+
 /// One run over the record.
 template <class Filter>
 void run(Filter& filter, int particles, std::uint64_t seed, const Row* record, float* estimates) {
@@ -117,10 +134,11 @@ void run(Filter& filter, int particles, std::uint64_t seed, const Row* record, f
         auvest::Status::kOk) {
       std::exit(1);
     }
-    const typename Filter::Positions mean = filter.positions();
+    Vector<float, 2> master, slave;
+    read_positions(filter, master, slave);
     for (int i = 0; i < 2; ++i) {
-      *estimates++ = mean.masters[0](i);
-      estimates[1] = mean.slave(i);
+      *estimates++ = master(i);
+      estimates[1] = slave(i);
     }
     estimates += 2;
   }
@@ -138,13 +156,13 @@ float* allocate(std::size_t numbers) {
   return static_cast<float*>(storage);
 }
 
-template <template <class, class, int, class, class> class Version>
+template <class Filter>
 int measure(const std::vector<Row>& record, int particles, int repeats, const char* output) {
-  using Filter = Version<Motion, Master, 1, auvest::SystematicResampling, Lanes>;
   const std::unique_ptr<float, void (*)(void*)> storage(
       allocate(Filter::Set::storage_size(particles)), std::free);
-  Filter filter(make_motion(), make_master(), auvest::SlatfParams<float>(), storage.get(),
-                particles);
+  typename Filter::Params params;
+  params.gate = 0;
+  Filter filter(make_motion(), make_master(), params, storage.get(), particles);
   const std::size_t runs = record.size() / kSteps;
   std::vector<float> estimates(runs * kSteps * 4);
   double least = 1e30;
@@ -171,7 +189,7 @@ int main(int argc, char** argv) {
   const int particles = argc > 4 ? std::atoi(argv[3]) : 0;
   const int repeats = argc > 4 ? std::atoi(argv[4]) : 0;
   const std::vector<float> numbers = argc > 4 ? read_numbers(argv[1]) : std::vector<float>();
-  if ((version != 1 && version != 2) || particles < 1 || repeats < 1 || numbers.empty() ||
+  if (version < 1 || version > 4 || particles < 1 || repeats < 1 || numbers.empty() ||
       numbers.size() % (4 * kSteps) != 0) {
     std::fputs("usage: slat_step RECORD VERSION PARTICLES REPEATS [ESTIMATES]\n", stderr);
     return 2;
@@ -183,6 +201,14 @@ int main(int argc, char** argv) {
     record[i].echo << numbers[4 * i + 2], numbers[4 * i + 3];
   }
   const char* output = argc > 5 ? argv[5] : nullptr;
-  return version == 1 ? measure<auvest::Slatf1>(record, particles, repeats, output)
-                      : measure<auvest::Slatf2>(record, particles, repeats, output);
+  switch (version) {
+    case 1:
+      return measure<First>(record, particles, repeats, output);
+    case 2:
+      return measure<Second>(record, particles, repeats, output);
+    case 3:
+      return measure<Joint>(record, particles, repeats, output);
+    default:
+      return measure<Shared>(record, particles, repeats, output);
+  }
 }

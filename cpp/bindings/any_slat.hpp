@@ -74,6 +74,7 @@ class AnySlat {
     filter_->read(readings);
     return readings;
   }
+  Scalar longest_step_s() const { return readings().longest_step_s; }
   std::vector<Scalar> mode_probabilities(int n) const {
     Scalar probabilities[bindings::kMostModes];
     const int count = filter_->mode_probabilities(n, probabilities);
@@ -180,7 +181,7 @@ class SlatModel : public bindings::SlatInterface<typename Filter::Scalar, Filter
   bool restore(const bindings::SlatStateView<Scalar>& state) override {
     StateReturner<Scalar> returner(state);
     Filter::visit_state(filter_, returner);
-    return returner.complete();
+    return returner.complete() && has_covariances();
   }
 
  protected:
@@ -200,7 +201,32 @@ class SlatModel : public bindings::SlatInterface<typename Filter::Scalar, Filter
 
   static std::uint8_t code(Status status) { return static_cast<std::uint8_t>(status); }
 
+  static void report(const NoSafeguards&, bindings::SlatReadings<Scalar>&) {}
+  template <class Watched>
+  static void report(const Watched& watched, bindings::SlatReadings<Scalar>& readings) {
+    readings.refused = watched.report().refused;
+    readings.rebirths = watched.report().rebirths;
+    readings.since_rebirth_s = watched.report().since_rebirth_s;
+  }
+
   Filter filter_;
+
+ private:
+  /// Whether slave and masters have covariances, after a state was put back.
+  bool has_covariances() const {
+    bindings::SlatReadings<Scalar> readings = {};
+    const Interface& self = *this;
+    self.read(readings);
+    Belief<Scalar, Filter::kPose> pose;
+    this->slave(pose.x, pose.P);
+    bool sound = check_slave(pose) == Status::kOk;
+    for (int n = 0; sound && n < readings.masters; ++n) {
+      Belief<Scalar, 6> master;
+      this->master(n, master.x, master.P);
+      sound = check_slave(master) == Status::kOk;
+    }
+    return sound;
+  }
 };
 
 /// What the particles stand in.
@@ -261,6 +287,8 @@ class SlatfModel final : private Numbers<typename Filter::Scalar>, public SlatMo
     readings.resamplings = filter.resamplings();
     readings.effective_size = filter.effective_size();
     readings.log_likelihood = filter.log_likelihood();
+    readings.longest_step_s = filter.longest_step_s();
+    Base::report(filter.safeguards(), readings);
   }
 
   void particles(Scalar* weights, Scalar* poses) const override {
@@ -305,6 +333,8 @@ class GaussianSlatModel final : public SlatModel<Filter> {
     return modes_of(this->filter_, n, out);
   }
   void read(bindings::SlatReadings<Scalar>& readings) const override {
+    readings.longest_step_s = this->filter_.longest_step_s();
+    Base::report(this->filter_.safeguards(), readings);
     read(this->filter_, readings);
   }
   void particles(Scalar*, Scalar*) const override {}
@@ -314,24 +344,22 @@ class GaussianSlatModel final : public SlatModel<Filter> {
   static Belief<Scalar, 6> master_of(const DeadReckoning<Motion>&, int) {
     return Belief<Scalar, 6>();
   }
-  template <class Motion, class Master, int Masters>
-  static Belief<Scalar, 6> master_of(const EkfSlat<Motion, Master, Masters>& filter, int n) {
+  template <class Other>
+  static Belief<Scalar, 6> master_of(const Other& filter, int n) {
     return filter.master(n);
   }
   template <class Motion>
   static int modes_of(const DeadReckoning<Motion>&, int, Scalar (&)[bindings::kMostModes]) {
     return 0;
   }
-  template <class Motion, class Master, int Masters>
-  static int modes_of(const EkfSlat<Motion, Master, Masters>& filter, int n,
-                      Scalar (&out)[bindings::kMostModes]) {
-    return ModeProbabilities<Master, EkfSlat<Motion, Master, Masters>>::of(filter, n, out);
+  template <class Other>
+  static int modes_of(const Other& filter, int n, Scalar (&out)[bindings::kMostModes]) {
+    return ModeProbabilities<typename Other::Master, Other>::of(filter, n, out);
   }
   template <class Motion>
   static void read(const DeadReckoning<Motion>&, bindings::SlatReadings<Scalar>&) {}
-  template <class Motion, class Master, int Masters>
-  static void read(const EkfSlat<Motion, Master, Masters>& filter,
-                   bindings::SlatReadings<Scalar>& readings) {
+  template <class Other>
+  static void read(const Other& filter, bindings::SlatReadings<Scalar>& readings) {
     readings.masters = filter.masters();
     readings.log_likelihood = filter.log_likelihood();
     readings.nis = filter.nis();

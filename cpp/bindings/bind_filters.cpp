@@ -274,7 +274,7 @@ void set_report(FilterHandle<Scalar>& handle, const py::object& given, Status st
     r.recovered = values["recovered"].cast<bool>();
   }
   handle.report = r;
-  handle.status = status;
+  handle.status = status == Status::kRecoveriesRepeat ? Status::kOk : status;  // not a call's
 }
 
 template <class Scalar>
@@ -297,6 +297,8 @@ desk::FilterOptions<Scalar> to_options(const py::dict& given, const AnyKernel<Sc
   require_ok(options.rule.check());
   options.policy = policy;
   options.late_s = given["late_s"].cast<Scalar>();
+  options.longest_step_s = given["longest_step_s"].cast<Scalar>();
+  if (!(options.longest_step_s > Scalar(0))) throw StatusError(Status::kBadParameter);
   return options;
 }
 
@@ -438,7 +440,9 @@ void bind_precision(py::module_& m) {
       .def("set_report", &set_report<Scalar>, py::arg("report"), py::arg("status"))
       .def_property_readonly("report", &report<Scalar>)
       .def_property_readonly("law", &law<Scalar>)
-      .def_readonly("status", &Filter::status)
+      .def_property_readonly(
+          "status",
+          [](const Filter& f) { return f.status == Status::kOk ? f.filter->status() : f.status; })
       .def_property_readonly("nis",
                              [](const Filter& f) {
                                require_idle(f);
@@ -465,12 +469,18 @@ void bind_precision(py::module_& m) {
       });
 
   m.def(
+      named<Scalar>("is_coarse").c_str(),
+      [](Scalar x, Scalar variance) { return math::is_coarse(x, variance); }, py::arg("x"),
+      py::arg("variance"),
+      "Whether the precision is too coarse at x for a number with this variance.");
+  m.def(
       named<Scalar>("make_process").c_str(),
       [](const std::string& name, const Array<Scalar>& values) {
         const auto& entry = catalogue<Scalar>().processes.at(name);
         require_shape(values, {py::ssize_t(entry.parameters.names.size())}, "values");
-        const auto process = entry.make(values.data());
-        if (process == nullptr) throw StatusError(Status::kBadParameter);
+        Status status = Status::kOk;
+        const auto process = entry.make(values.data(), status);
+        require_ok(status);
         return std::const_pointer_cast<Process>(process);
       },
       py::arg("name"), py::arg("values").noconvert());
@@ -479,8 +489,9 @@ void bind_precision(py::module_& m) {
       [](const std::string& name, int states, const Array<Scalar>& values) {
         const auto& entry = catalogue<Scalar>().sensors.at({name, states});
         require_shape(values, {py::ssize_t(entry.parameters.names.size())}, "values");
-        const auto sensor = entry.make(values.data());
-        if (sensor == nullptr) throw StatusError(Status::kBadParameter);
+        Status status = Status::kOk;
+        const auto sensor = entry.make(values.data(), status);
+        require_ok(status);
         return sensor;
       },
       py::arg("name"), py::arg("states"), py::arg("values").noconvert());

@@ -95,7 +95,8 @@ void bind_slat(py::module_& m) {
   m.def("sonar_defaults", [] { return to_dict(Sonar<double>::Params()); });
   m.def("slatf_defaults", [] { return to_dict(SlatfParams<double>()); });
   m.def("slatf_joint_defaults", [] { return to_dict(SlatfJointParams<double>()); });
-  m.def("ekf_slat_defaults", [] { return to_dict(CompassEkfSlat<double>::Params()); });
+  m.def("slatf_shared_defaults", [] { return to_dict(SlatfSharedParams<double>()); });
+  m.def("ekf_slat_defaults", [] { return to_dict(EkfSlatParams<double>()); });
   m.attr("slat_max_masters") = static_cast<int>(AnySlat<float, 2>::kMasters);
   m.attr("slat_unknown_master") = kUnknownMaster;
 

@@ -14,7 +14,11 @@ void bind_status(py::module_& m) {
       .value("alpha_too_small", Status::kAlphaTooSmall)
       .value("overflow", Status::kOverflow)
       .value("unstable_step", Status::kUnstableStep)
-      .value("steep_pitch", Status::kSteepPitch);
+      .value("steep_pitch", Status::kSteepPitch)
+      .value("step_too_long", Status::kStepTooLong)
+      .value("impossible_range", Status::kImpossibleRange)
+      .value("far_from_origin", Status::kFarFromOrigin)
+      .value("recoveries_repeat", Status::kRecoveriesRepeat);
   m.def("describe", static_cast<const char* (*)(Status)>(&describe), py::arg("status"),
         "One line of English for a status.");
 

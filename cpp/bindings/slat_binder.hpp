@@ -49,7 +49,7 @@ class SlatBinder {
                     py::arg("version"), py::arg("particles"), py::arg("lanes"))
         .def_static("slatf_joint", &slatf_joint, py::arg("motion"), py::arg("master"),
                     py::arg("params"), py::arg("resampling"), py::arg("particles"),
-                    py::arg("max_masters"))
+                    py::arg("max_masters"), py::arg("shared"))
         .def_static(
             "ekf_slat",
             [](const py::dict& motion_params, const py::dict& master, const py::dict& params) {
@@ -61,11 +61,12 @@ class SlatBinder {
             py::arg("motion"), py::arg("master"), py::arg("params"))
         .def_static(
             "dead_reckoning",
-            [](const py::dict& motion_params) {
+            [](const py::dict& motion_params, Scalar longest_step_s) {
               using Reckoning = DeadReckoning<Motion>;
-              return Any(new GaussianSlatModel<Reckoning>(Reckoning(model<Motion>(motion_params))));
+              return Any(new GaussianSlatModel<Reckoning>(
+                  Reckoning(model<Motion>(motion_params), longest_step_s)));
             },
-            py::arg("motion"))
+            py::arg("motion"), py::arg("longest_step_s"))
         .def("copy", [](const Any& f) { return Any(f); })
         .def(
             "reset",
@@ -135,6 +136,10 @@ class SlatBinder {
         .def_property_readonly("log_likelihood",
                                [](const Filter& f) { return readings_of(f).log_likelihood; })
         .def_property_readonly("nis", [](const Filter& f) { return readings_of(f).nis; })
+        .def_property_readonly("refused", [](const Filter& f) { return readings_of(f).refused; })
+        .def_property_readonly("rebirths", [](const Filter& f) { return readings_of(f).rebirths; })
+        .def_property_readonly("since_rebirth_s",
+                               [](const Filter& f) { return readings_of(f).since_rebirth_s; })
         .def("run", &run<Filter>, py::arg("time_s").noconvert(), py::arg("u").noconvert(),
              py::arg("changes").noconvert(), py::arg("echo_time_s").noconvert(),
              py::arg("z").noconvert(), py::arg("master").noconvert(), py::arg("sonar"),
@@ -326,11 +331,8 @@ class SlatBinder {
   template <class Ekf>
   static Any ekf_slat(const Motion& motion, const typename Ekf::Master& master,
                       const py::dict& values) {
-    typename EkfSlatOf<Motion>::Params given =
-        from_dict<typename EkfSlatOf<Motion>::Params>(values);
-    typename Ekf::Params params;
-    params.gate = given.gate;
-    return Any(new GaussianSlatModel<Ekf>(Ekf(motion, master, params)));
+    return Any(
+        new GaussianSlatModel<Ekf>(Ekf(motion, master, from_dict<EkfSlatParams<Scalar>>(values))));
   }
 
   static Any slatf(const py::dict& motion, const py::dict& master, const py::dict& params,
@@ -371,11 +373,25 @@ class SlatBinder {
   }
 
   static Any slatf_joint(const py::dict& motion, const py::dict& master, const py::dict& params,
-                         const std::string& resampling, int particles, int max_masters) {
+                         const std::string& resampling, int particles, int max_masters,
+                         bool shared) {
+    if (shared) {
+      SlatfSharedSetup<Motion> setup;
+      fill(motion, master, params, resampling, particles, max_masters, setup);
+      return Any(make_slatf_shared(setup));
+    }
     SlatfJointSetup<Motion> setup;
+    fill(motion, master, params, resampling, particles, max_masters, setup);
+    return Any(make_slatf_joint(setup));
+  }
+
+  template <class Params>
+  static void fill(const py::dict& motion, const py::dict& master, const py::dict& params,
+                   const std::string& resampling, int particles, int max_masters,
+                   JointSetup<Motion, Params>& setup) {
     setup.motion = model<Motion>(motion);
     setup.master = model<Master>(master);
-    setup.params = from_dict<SlatfJointParams<Scalar>>(params);
+    setup.params = from_dict<Params>(params);
     setup.resampling = resampling_named(resampling);
     setup.particles = particles;
     setup.max_masters = max_masters;
@@ -383,7 +399,6 @@ class SlatBinder {
     if (max_masters < 1 || max_masters > Any::kMasters) {
       throw py::value_error("max_masters must be 1 to slat_max_masters");
     }
-    return Any(make_slatf_joint(setup));
   }
 
   static void share(Switch& outage, const Array<Scalar>& x, const Array<Scalar>& p,
@@ -470,6 +485,7 @@ class SlatBinder {
     py::array_t<std::int64_t> resamplings(rows);
     py::array_t<Scalar> log_likelihood(rows);
     py::array_t<Scalar> nis(rows);
+    py::array_t<std::int64_t> refused(rows), rebirths(rows);
     Scalar* x_out = x.mutable_data();
     Scalar* p_out = p.mutable_data();
     Scalar* masters_x_out = masters_x.mutable_data();
@@ -479,6 +495,8 @@ class SlatBinder {
     std::int64_t* resamplings_out = resamplings.mutable_data();
     Scalar* likelihood_out = log_likelihood.mutable_data();
     Scalar* nis_out = nis.mutable_data();
+    std::int64_t* refused_out = refused.mutable_data();
+    std::int64_t* rebirths_out = rebirths.mutable_data();
     const double* time = time_s.data();
 
     std::vector<TimedEcho<Scalar, double>> heard(static_cast<std::size_t>(echoes));
@@ -531,6 +549,8 @@ class SlatBinder {
         resamplings_out[done] = readings.resamplings;
         likelihood_out[done] = readings.log_likelihood;
         nis_out[done] = readings.nis;
+        refused_out[done] = readings.refused;
+        rebirths_out[done] = readings.rebirths;
         ++done;
       });
     }
@@ -546,6 +566,8 @@ class SlatBinder {
     result["resamplings"] = resamplings;
     result["log_likelihood"] = log_likelihood;
     result["nis"] = nis;
+    result["refused"] = refused;
+    result["rebirths"] = rebirths;
     return result;
   }
 
@@ -566,7 +588,7 @@ class SlatBinder {
     py::array_t<double> covariance(std::vector<py::ssize_t>{runs, pings, 2, 2});
     py::array_t<double> master_error(std::vector<py::ssize_t>{runs, pings, count, 2});
     py::array_t<double> size(flat), nis(flat);
-    py::array_t<std::int64_t> resamplings(runs), heard(runs);
+    py::array_t<std::int64_t> resamplings(runs), heard(runs), refused(runs), rebirths(runs);
     py::array_t<double> log_likelihood(runs);
     py::array_t<std::uint8_t> result_status(runs);
     for (auto* array : {&time, &truth, &masters, &error, &covariance, &master_error, &size, &nis}) {
@@ -583,6 +605,8 @@ class SlatBinder {
     double* likelihood_out = log_likelihood.mutable_data();
     std::int64_t* resamplings_out = resamplings.mutable_data();
     std::int64_t* heard_out = heard.mutable_data();
+    std::int64_t* refused_out = refused.mutable_data();
+    std::int64_t* rebirths_out = rebirths.mutable_data();
     std::uint8_t* status_out = result_status.mutable_data();
     {
       py::gil_scoped_release release;
@@ -625,6 +649,8 @@ class SlatBinder {
         resamplings_out[run] = end.resamplings;
         likelihood_out[run] = static_cast<double>(end.log_likelihood);
         heard_out[run] = echoes;
+        refused_out[run] = end.refused;
+        rebirths_out[run] = end.rebirths;
         status_out[run] = static_cast<std::uint8_t>(status);
       }
     }
@@ -639,6 +665,8 @@ class SlatBinder {
     result["nis"] = nis;
     result["resamplings"] = resamplings;
     result["heard"] = heard;
+    result["refused"] = refused;
+    result["rebirths"] = rebirths;
     result["log_likelihood"] = log_likelihood;
     result["status"] = result_status;
     return result;

@@ -30,6 +30,10 @@ struct SlatReadings {
   Scalar effective_size;
   Scalar log_likelihood;
   Scalar nis;
+  int refused;
+  int rebirths;
+  Scalar since_rebirth_s;  ///< -1: none yet
+  Scalar longest_step_s;
 };
 
 /// The state of a filter, in the order in which it visits its numbers. Of particles the weights

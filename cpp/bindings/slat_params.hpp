@@ -10,6 +10,7 @@
 #include "auvest/slat/ekf_slat.hpp"
 #include "auvest/slat/slatf.hpp"
 #include "auvest/slat/slatf_joint.hpp"
+#include "auvest/slat/slatf_shared.hpp"
 #include "simulation/slat.hpp"
 
 namespace auvest {
@@ -29,7 +30,8 @@ AUVEST_VISIT(CompassMotion, v("sigma_speed_m_s", p.sigma_speed_m_s);
              v("sigma_heading_rad", p.sigma_heading_rad); v("compensate_bias", p.compensate_bias);)
 AUVEST_VISIT(UnicycleMotion, v("sigma_speed_m_s", p.sigma_speed_m_s);
              v("sigma_yaw_rate_rad_s", p.sigma_yaw_rate_rad_s);)
-AUVEST_VISIT(PiecewiseAcceleration, v("acceleration_m_s2", p.acceleration_m_s2);)
+AUVEST_VISIT(PiecewiseAcceleration, v("acceleration_m_s2", p.acceleration_m_s2);
+             v("position_psd", p.position_psd);)
 AUVEST_VISIT(ConstantVelocity, v("velocity_psd", p.velocity);
              v("sigma_acceleration_m_s2", p.sigma_acceleration_m_s2);)
 AUVEST_VISIT(CoordinatedTurn, v("position_psd", p.noise.position);
@@ -38,32 +40,52 @@ AUVEST_VISIT(CoordinatedTurn, v("position_psd", p.noise.position);
 AUVEST_VISIT(Sonar, v("sigma_range_m", p.sigma_range_m);
              v("sigma_bearing_rad", p.sigma_bearing_rad);)
 
+#undef AUVEST_VISIT
+
 template <class Motion>
 using EkfSlatOf = EkfSlat<Motion, PiecewiseAcceleration<typename Motion::Scalar>,
                           AnySlat<typename Motion::Scalar, Motion::kStates>::kMasters>;
-template <class Scalar>
-using CompassEkfSlat = EkfSlatOf<CompassMotion<Scalar>>;
-template <class Scalar>
-using UnicycleEkfSlat = EkfSlatOf<UnicycleMotion<Scalar>>;
-AUVEST_VISIT(CompassEkfSlat, v("gate", p.gate);)
-AUVEST_VISIT(UnicycleEkfSlat, v("gate", p.gate);)
 
-#undef AUVEST_VISIT
+template <class Scalar, class Visitor>
+void visit(EchoParams<Scalar>& p, Visitor v) {
+  v("gate", p.gate);
+  v("recover_after", p.recover_after);
+  v("recover_of", p.recover_of);
+  v("fastest_m_s", p.fastest_m_s);
+  v("forget_after_s", p.forget_after_s);
+  v("rebirth_velocity_m_s", p.rebirth_velocity_m_s);
+  v("rebirth_acceleration_m_s2", p.rebirth_acceleration_m_s2);
+  v("longest_step_s", p.longest_step_s);
+}
+
+template <class Scalar, class Visitor>
+void visit(EkfSlatParams<Scalar>& p, Visitor v) {
+  visit(static_cast<EchoParams<Scalar>&>(p), v);
+  v("consider", p.consider);
+}
 
 template <class Scalar, class Visitor>
 void visit(SlatfParams<Scalar>& p, Visitor v) {
+  visit(static_cast<EchoParams<Scalar>&>(p), v);
   v("resample_below", p.resample_below);
   v("carry_covariance", p.carry_covariance);
-  v("gate", p.gate);
   v("birth_velocity_m_s", p.birth_velocity_m_s);
   v("birth_acceleration_m_s2", p.birth_acceleration_m_s2);
+  v("monte_carlo", p.monte_carlo);
 }
 
 template <class Scalar, class Visitor>
 void visit(SlatfJointParams<Scalar>& p, Visitor v) {
+  visit(static_cast<EchoParams<Scalar>&>(p), v);
   v("resample_below", p.resample_below);
   v("kept", p.kept);
-  v("gate", p.gate);
+}
+
+template <class Scalar, class Visitor>
+void visit(SlatfSharedParams<Scalar>& p, Visitor v) {
+  visit(static_cast<EchoParams<Scalar>&>(p), v);
+  v("resample_below", p.resample_below);
+  v("kept", p.kept);
 }
 
 template <class Visitor>
@@ -88,6 +110,8 @@ void visit(SlatScenario& p, Visitor v) {
   v("dropout", p.dropout);
   v("outlier", p.outlier);
   v("outlier_sigmas", p.outlier_sigmas);
+  v("doubled", p.doubled);
+  v("doubled_in_a_row", p.doubled_in_a_row);
   v("silent_from_s", p.silent_from_s);
   v("silent_to_s", p.silent_to_s);
   v("identified", p.identified);

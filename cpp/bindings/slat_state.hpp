@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "auvest/math/basic.hpp"
 #include "auvest/particles/log_weights.hpp"
 #include "auvest/particles/particle_set.hpp"
 #include "auvest/types.hpp"
@@ -84,7 +85,7 @@ class StateReturner {
   }
 
   void operator()(Scalar& number) {
-    fits_ = fits_ && number_ < state_.number_count;
+    fits_ = fits_ && number_ < state_.number_count && math::is_finite(state_.numbers[number_]);
     if (fits_) number = state_.numbers[number_++];
   }
   template <int Rows, int Cols>

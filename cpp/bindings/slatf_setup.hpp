@@ -11,6 +11,7 @@
 #include "auvest/slat/imm_slat.hpp"
 #include "auvest/slat/slatf.hpp"
 #include "auvest/slat/slatf_joint.hpp"
+#include "auvest/slat/slatf_shared.hpp"
 
 // Particles stand in vector registers where xsimd is there to write it.
 #if defined(__x86_64__) && __has_include(<xsimd/xsimd.hpp>)
@@ -44,18 +45,23 @@ struct SlatfSetup {
   int particles = 100;
 };
 
-template <class Motion_>
-struct SlatfJointSetup {
+template <class Motion_, class Params>
+struct JointSetup {
   using Motion = Motion_;
   using Scalar = typename Motion::Scalar;
 
   Motion motion;
   PiecewiseAcceleration<Scalar> master;
-  SlatfJointParams<Scalar> params;
+  Params params;
   AnyResampling resampling;
   int particles = 100;
   int max_masters = 1;  ///< 1, or up to kMostMasters: storage and time grow with the square
 };
+
+template <class Motion>
+using SlatfJointSetup = JointSetup<Motion, SlatfJointParams<typename Motion::Scalar>>;
+template <class Motion>
+using SlatfSharedSetup = JointSetup<Motion, SlatfSharedParams<typename Motion::Scalar>>;
 
 template <class Motion>
 using SlatfInterface = bindings::SlatInterface<typename Motion::Scalar, Motion::kStates>;
@@ -68,6 +74,10 @@ SlatfInterface<Motion>* make_slatf(const SlatfSetup<Motion, Master>& setup);
 /// Defined and compiled in slatf_joint.cpp.
 template <class Motion>
 SlatfInterface<Motion>* make_slatf_joint(const SlatfJointSetup<Motion>& setup);
+
+/// Defined and compiled in slatf_shared.cpp.
+template <class Motion>
+SlatfInterface<Motion>* make_slatf_shared(const SlatfSharedSetup<Motion>& setup);
 
 }  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

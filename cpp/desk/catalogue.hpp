@@ -24,8 +24,8 @@ struct Parameters {
 template <class Scalar, class Made>
 struct Entry {
   Parameters parameters;
-  /// Null where a parameter is out of range.
-  std::function<std::shared_ptr<Made>(const Scalar*)> make;
+  /// Null where check() refuses the parameters; `status` then says why.
+  std::function<std::shared_ptr<Made>(const Scalar*, Status& status)> make;
 };
 
 template <class Scalar>
@@ -72,9 +72,11 @@ void add_process(Catalogue<Scalar>& catalogue, const std::string& name) {
   using Params = ParamsOf<Process>;
   auto& entry = catalogue.processes[name];
   entry.parameters = parameters_of<Params>();
-  entry.make = [](const Scalar* values) -> std::shared_ptr<const AnyProcess<Scalar>> {
+  entry.make = [](const Scalar* values,
+                  Status& status) -> std::shared_ptr<const AnyProcess<Scalar>> {
     const Process process = model_from<Process>(params_from<Params>(values));
-    if (process.check() != Status::kOk) return nullptr;
+    status = process.check();
+    if (status != Status::kOk) return nullptr;
     return std::make_shared<const ProcessOf<Process>>(process);
   };
 }
@@ -84,9 +86,10 @@ void add_sensor(Catalogue<Scalar>& catalogue, const std::string& name) {
   using Params = ParamsOf<Model>;
   auto& entry = catalogue.sensors[{name, Model::kStates}];
   entry.parameters = parameters_of<Params>();
-  entry.make = [](const Scalar* values) -> std::shared_ptr<AnySensor<Scalar>> {
+  entry.make = [](const Scalar* values, Status& status) -> std::shared_ptr<AnySensor<Scalar>> {
     const Model model = model_from<Model>(params_from<Params>(values));
-    if (model.check() != Status::kOk) return nullptr;
+    status = model.check();
+    if (status != Status::kOk) return nullptr;
     return std::make_shared<SensorOf<Model>>(model);
   };
 }

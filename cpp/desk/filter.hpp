@@ -28,7 +28,8 @@ struct FilterOptions {
   typename SigmaPoints<Scalar>::Params points;
   Rule rule;
   AnyInterval<Scalar> policy;
-  Scalar late_s = Scalar(0);  ///< how far back a measurement may belong [s]
+  Scalar longest_step_s = Scalar(3600);  ///< a longer prediction is refused [s]
+  Scalar late_s = Scalar(0);             ///< how far back a measurement may belong [s]
 };
 
 /// Rows in: each predicts, corrects by what was measured, and chooses the next interval.
@@ -70,11 +71,14 @@ struct FilterState {
   std::vector<Scalar> x, P;      ///< of the belief; P row by row
   std::vector<Scalar> input;     ///< that drove the last prediction
   std::vector<Scalar> policy;    ///< interval and the memory of the Mahalanobis law: 9 numbers
-  std::vector<Scalar> recovery;  ///< count, variance, two recent rejections: 8 numbers
+  std::vector<Scalar> recovery;  ///< count, variance, two recent rejections, widenings: 9 numbers
   std::vector<Scalar> base;      ///< of the late memory: x, P, input, recovery of its base
   std::vector<Scalar> events;    ///< of the late memory: kEventNumbers each
   std::vector<std::shared_ptr<const AnySensor<Scalar>>> sensors;  ///< of the events; null: predict
 };
+
+/// Numbers of a recovery.
+const std::size_t kRecoveryNumbers = 9;
 
 /// Numbers of an event: dt, input, z, moved, place.
 const std::size_t kEventNumbers = 1 + kMaxInputs + kMaxSize + 1 + kMaxPlace;
@@ -101,6 +105,8 @@ class AnyFilter {
   virtual std::size_t run(const Record<Scalar>& record, const Columns<Scalar>& out,
                           Report<Scalar>& last, Status& status) = 0;
 
+  /// What the filter says of itself, as Robust does.
+  virtual Status status() const = 0;
   virtual void x(Scalar* out) const = 0;
   virtual void P(Scalar* out) const = 0;
   virtual Scalar interval() const = 0;
@@ -232,6 +238,7 @@ class FilterFor final : public AnyFilter<Scalar> {
     return record.rows;
   }
 
+  Status status() const override { return filter_.status(); }
   void x(Scalar* out) const override { copy(filter_.x(), out); }
   void P(Scalar* out) const override { copy(filter_.P(), out); }
   Scalar interval() const override { return filter_.interval(); }
@@ -272,9 +279,9 @@ class FilterFor final : public AnyFilter<Scalar> {
 
   Status restore(const FilterState<Scalar>& state) override {
     Adaptive filter = filter_;
-    const std::size_t base = N + N * N + kMaxInputs + 8;
+    const std::size_t base = N + N * N + kMaxInputs + kRecoveryNumbers;
     if (state.x.size() != N || state.P.size() != N * N || state.input.size() != kMaxInputs ||
-        state.policy.size() != 9 || state.recovery.size() != 8 ||
+        state.policy.size() != 9 || state.recovery.size() != kRecoveryNumbers ||
         state.base.size() != (late() ? base : 0) ||
         state.events.size() != kEventNumbers * state.sensors.size()) {
       return Status::kBadParameter;
@@ -303,7 +310,12 @@ class FilterFor final : public AnyFilter<Scalar> {
     }
     Events events(late_s_);
     for (std::size_t k = 0; k < state.sensors.size(); ++k) {
-      events.insert(static_cast<int>(k), event(&state.events[k * kEventNumbers], state.sensors[k]));
+      const Scalar* numbers = &state.events[k * kEventNumbers];
+      if (!math::all_finite(numbers, kEventNumbers)) return Status::kNotFinite;
+      if (!math::within(numbers[0], Scalar(0), filter.longest_step_s())) {
+        return Status::kBadParameter;
+      }
+      events.insert(static_cast<int>(k), event(numbers, state.sensors[k]));
     }
     filter_ = filter;
     memory_ = Memory(start, events);
@@ -316,7 +328,9 @@ class FilterFor final : public AnyFilter<Scalar> {
     RuntimeProcess<Scalar, N> driven;
     driven.model = process;
     const AnyLinearisation<Scalar> how(options.kind, options.points, N);
-    return Robust(RuntimeGaussian<Scalar, N>(driven, how), options.rule);
+    Robust filter(RuntimeGaussian<Scalar, N>(driven, how), options.rule);
+    filter.limit_steps(options.longest_step_s);
+    return filter;
   }
 
   bool late() const { return late_s_ > Scalar(0); }
@@ -382,6 +396,7 @@ class FilterFor final : public AnyFilter<Scalar> {
     out.push_back(Scalar(streak.count));
     out.push_back(streak.variance);
     append(streak.recent, out);
+    out.push_back(Scalar(streak.widened));
   }
 
   static Status restore_robust(Robust& filter, const Scalar* x, const Scalar* P,
@@ -391,9 +406,11 @@ class FilterFor final : public AnyFilter<Scalar> {
     for (int i = 0; i < N * N; ++i) belief.P.data()[i] = P[i];
     auto rule = filter.rule();
     auto& streak = rule.recovery.streak;
-    const bool counts = recovery[0] >= Scalar(0) && recovery[0] <= Scalar(255);
+    const bool counts = math::within(recovery[0], Scalar(0), Scalar(255)) &&
+                        math::within(recovery[8], Scalar(0), Scalar(255));
     if (!counts || !math::all_finite(input, kMaxInputs)) return Status::kBadParameter;
     streak.count = static_cast<std::uint8_t>(recovery[0]);
+    streak.widened = static_cast<std::uint8_t>(recovery[8]);
     streak.variance = recovery[1];
     for (int i = 0; i < 6; ++i) streak.recent.data()[i] = recovery[2 + i];
     const Status status = filter.restore(belief, rule);

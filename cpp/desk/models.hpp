@@ -269,7 +269,8 @@ class SensorOf final : public SensorFor<typename Model::Scalar, Model::kStates> 
     if (!placed.moved) return update(filter, value, model_);
     Model there = model_;
     there.place(placed.place);
-    return update(filter, value, there);
+    const Status status = there.check();
+    return status == Status::kOk ? update(filter, value, there) : Report<Scalar>(status);
   }
 
   void measure(const Scalar* x, Scalar* z, std::size_t rows) const override {

@@ -157,6 +157,7 @@ inline Status cooperate(Filter& filter,
   const std::uint32_t cycle = 2 * scenario.range_every;
   RangeMessage messages[kMessagesInFlight];
   Late late(filter);
+  sensor.params.lift_smallest();  // the noise may take the range below 0
   for (std::uint32_t k = 1; k <= steps; ++k) {
     double speed_error = 0;
     double heading_error = 0;

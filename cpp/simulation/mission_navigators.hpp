@@ -131,6 +131,7 @@ RangeBearing<Scalar, N> sonar_as(const UsblDevice& usbl) {
   p.station_y_m = Scalar(usbl.station_m[1]);
   p.sigma_range_m = Scalar(usbl.noise_m);
   p.sigma_bearing_rad = Scalar(usbl.noise_rad);
+  p.lift_smallest();  // the noise may take the range below 0
   return RangeBearing<Scalar, N>(p);
 }
 

@@ -69,6 +69,8 @@ struct SlatScenario {
   double dropout = 0;           ///< probability that an echo is lost
   double outlier = 0;           ///< probability that an echo is wrong ...
   double outlier_sigmas = 100;  ///< ... by this many standard deviations in range and bearing
+  double doubled = 0;           ///< probability that an echo has twice the range: a multipath ...
+  int doubled_in_a_row = 1;     ///< ... and so many that follow it
   double silent_from_s = 1e9;   ///< no echo from here ...
   double silent_to_s = 1e9;     ///< ... to here
   bool identified = true;       ///< the filter is told whose echo it hears
@@ -136,6 +138,7 @@ inline Status run_slat(Filter& filter, const Sonar<typename Filter::Scalar>& son
   }
   if (status != Status::kOk) return status;
 
+  int doubled[SlatScenario::kMasters] = {0, 0, 0, 0};  // echoes that are still to be
   const int steps = static_cast<int>(scenario.duration_s / scenario.odometry_s + 0.5);
   for (int k = 1; k <= steps; ++k) {
     const double dt = scenario.odometry_s;
@@ -168,13 +171,18 @@ inline Status run_slat(Filter& filter, const Sonar<typename Filter::Scalar>& son
       world.normal_pair(noise[0], noise[1]);
       const bool lost = world.uniform<double>() < scenario.dropout;
       const bool wrong = world.uniform<double>() < scenario.outlier;
+      if (scenario.doubled > 0 && doubled[n] == 0 && world.uniform<double>() < scenario.doubled) {
+        doubled[n] = scenario.doubled_in_a_row;
+      }
+      const double times = doubled[n] > 0 ? 2 : 1;
+      if (doubled[n] > 0) --doubled[n];
       if (lost || (time > scenario.silent_from_s && time <= scenario.silent_to_s)) continue;
       const double scale = wrong ? scenario.outlier_sigmas : 1;
       const double dx = slave.position[0] - masters[n].position[0];
       const double dy = slave.position[1] - masters[n].position[1];
       heard[count].master = scenario.identified ? n : kUnknownMaster;
       // [SLATF 5]
-      heard[count].z(0) = static_cast<Scalar>(math::sqrt(dx * dx + dy * dy) +
+      heard[count].z(0) = static_cast<Scalar>(times * math::sqrt(dx * dx + dy * dy) +
                                               scale * scenario.sigma_range_m * noise[0]);
       heard[count].z(1) = static_cast<Scalar>(
           math::wrap(math::atan2(dy, dx) + scale * scenario.sigma_bearing_rad * noise[1]));

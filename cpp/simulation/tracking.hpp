@@ -137,11 +137,12 @@ struct TrackingProbe {
 /// Runs the loop for at most `steps` samples and `duration_s` seconds and hands every step to
 /// `sink(step)`. Stops at the first status that is not kOk and returns it.
 template <class Filter, class Model, class Sink>
-inline Status track(Filter& filter, const Model& model, Track truth, const SensorNoise& noise,
+inline Status track(Filter& filter, Model model, Track truth, const SensorNoise& noise,
                     math::Random& random, std::uint32_t steps, double duration_s,
                     TrackingProbe& probe, Sink&& sink) {
   using Scalar = typename Filter::Scalar;
   using Position = typename Filter::Position;
+  model.params.lift_smallest();  // the noise may take the range below 0
   double time = 0;
   for (std::uint32_t k = 0; k < steps; ++k) {
     const Scalar interval = filter.interval();

@@ -25,6 +25,7 @@ namespace auvest {
 /// What the runs have in common.
 struct StartScenario {
   int leaders = 3;                ///< 1..4
+  double moving_fraction = 0.5;   ///< of the runs: the leaders move, at up to 2 m/s
   bool spread = true;             ///< round the craft (two: 60 to 120 deg apart), or all in 30 deg
   double late_fraction = 0;       ///< of the ranges: late by 5 to 50 m
   double outlier_fraction = 0;    ///< of the ranges: with ten times the sigma
@@ -47,7 +48,7 @@ class StartWorld {
       : scenario_(scenario), random_(seed, run) {
     const double turn = math::two_pi<double>();
     const double distance = 50 * math::exp(uniform(0, 1) * math::log(20.0));  // 50..1000 m
-    const bool moving = uniform(0, 1) < 0.5;
+    const bool moving = uniform(0, 1) < scenario.moving_fraction;
     const double first = uniform(0, turn);
     const double apart = uniform(turn / 6, turn / 3);
     for (int k = 0; k < scenario.leaders; ++k) {
@@ -128,8 +129,8 @@ class StartWorld {
 };
 
 /// Runs a filter with the process SpeedHeading over `ranges` ranges from a start it does not know,
-/// and hands it to `sink(range, filter, world, correction)` after each. A prediction over the wrong
-/// time stamp may be refused; any other refusal ends the run and is returned.
+/// and hands it to `sink(range, filter, world, correction)` after each. A refusal ends the run and
+/// is returned.
 template <class Filter, class Sink>
 inline Status run_unknown_start(Filter& filter, const StartScenario& scenario, std::uint64_t seed,
                                 std::uint64_t run, std::uint32_t ranges, Sink&& sink) {
@@ -147,6 +148,7 @@ inline Status run_unknown_start(Filter& filter, const StartScenario& scenario, s
   Status status = filter.reset(x, P);
   Sensor sensor;
   sensor.params.sigma_range_m = static_cast<Scalar>(scenario.sigma_range_m);
+  sensor.params.lift_smallest();  // noise is not cut off at a leader
   for (std::uint32_t k = 1; k <= ranges && status == Status::kOk; ++k) {
     typename Filter::Process::Input input;
     math::set_zero(input);
@@ -158,7 +160,13 @@ inline Status run_unknown_start(Filter& filter, const StartScenario& scenario, s
       status = filter.predict(Scalar(1), input);
     }
     if (status != Status::kOk) return status;
-    if (k == scenario.bad_step) filter.predict(static_cast<Scalar>(scenario.bad_step_s), input);
+    // In steps that no filter refuses for their length.
+    double bad_s = k == scenario.bad_step ? scenario.bad_step_s : 0;
+    while (bad_s > 0 && status == Status::kOk) {
+      status = filter.predict(static_cast<Scalar>(bad_s < 3600 ? bad_s : 3600), input);
+      bad_s -= 3600;
+    }
+    if (status != Status::kOk) return status;
     double there[2];
     Vector<Scalar, 1> z;
     z(0) = static_cast<Scalar>(world.range(static_cast<int>(k) % scenario.leaders, there));

@@ -19,6 +19,7 @@ using Master = auvest::PiecewiseAcceleration<Scalar>;
 using Slatf1 = auvest::Slatf1<Motion, Master, 1>;
 using Slatf2 = auvest::Slatf2<Motion, Master, 1>;
 using SlatfJoint = auvest::SlatfJoint<Motion, Master, 1>;
+using SlatfShared = auvest::SlatfShared<Motion, Master, 1>;
 
 constexpr double kBound95 = 5.991;  // chi-square, 2 degrees of freedom
 
@@ -81,7 +82,12 @@ void run(Filter& filter, const auvest::SlatScenario& scenario, int number, Colum
 int main(int argc, char** argv) {
   const int runs = argc > 1 ? std::atoi(argv[1]) : 50;
   const int particles = argc > 2 ? std::atoi(argv[2]) : 100;
+  // As in the paper, without a gate; the shared covariance as it is shown first, with one.
   SlatfJoint::Params joint_params;
+  auvest::EkfSlat<Motion, Master, 1>::Params ekf_params;
+  Slatf1::Params params;
+  joint_params.gate = ekf_params.gate = params.gate = 0;
+  params.monte_carlo = false;
   if (argc > 3) joint_params.kept = std::atof(argv[3]);
   if (argc > 4 || runs < 1 || particles < 1 ||
       !(joint_params.kept >= 0 && joint_params.kept <= 1)) {
@@ -94,6 +100,7 @@ int main(int argc, char** argv) {
   std::vector<Scalar> storage1(Slatf1::Set::storage_size(particles));
   std::vector<Scalar> storage2(Slatf2::Set::storage_size(particles));
   std::vector<Scalar> storage_joint(SlatfJoint::Set::storage_size(particles));
+  std::vector<Scalar> storage_shared(SlatfShared::Set::storage_size(particles));
   Motion::Params plain;
   plain.compensate_bias = false;
   std::printf("%d runs, N = %d, kept = %g: RMSE in m (NEES inside its 95 %% bound)\nlevel", runs,
@@ -102,21 +109,25 @@ int main(int argc, char** argv) {
     auvest::SlatScenario scenario;
     scenario.sigma_range_m = levels[level][0];
     scenario.sigma_bearing_rad = levels[level][1];
-    Column columns[6] = {Column("dead reckoning"), Column("compensated"), Column("SLATF 1.0"),
-                         Column("SLATF 2.0"),      Column("SlatfJoint"),  Column("EKF-SLAT")};
+    Column columns[7] = {Column("dead reckoning"), Column("compensated"), Column("SLATF 1.0"),
+                         Column("SLATF 2.0"),      Column("SlatfJoint"),  Column("SlatfShared"),
+                         Column("EKF-SLAT")};
     for (int k = 0; k < runs; ++k) {
       auvest::DeadReckoning<Motion> reckoning((Motion(plain)));
       auvest::DeadReckoning<Motion> compensated((Motion()));
-      Slatf1 slatf1(Motion(), Master(), Slatf1::Params(), storage1.data(), particles);
-      Slatf2 slatf2(Motion(), Master(), Slatf2::Params(), storage2.data(), particles);
+      Slatf1 slatf1(Motion(), Master(), params, storage1.data(), particles);
+      Slatf2 slatf2(Motion(), Master(), params, storage2.data(), particles);
       SlatfJoint joint(Motion(), Master(), joint_params, storage_joint.data(), particles);
-      auvest::EkfSlat<Motion, Master, 1> ekf((Motion()), Master());
+      SlatfShared shared(Motion(), Master(), SlatfShared::Params(), storage_shared.data(),
+                         particles);
+      auvest::EkfSlat<Motion, Master, 1> ekf((Motion()), Master(), ekf_params);
       run(reckoning, scenario, k, columns[0]);
       run(compensated, scenario, k, columns[1]);
       run(slatf1, scenario, k, columns[2]);
       run(slatf2, scenario, k, columns[3]);
       run(joint, scenario, k, columns[4]);
-      run(ekf, scenario, k, columns[5]);
+      run(shared, scenario, k, columns[5]);
+      run(ekf, scenario, k, columns[6]);
     }
     if (level == 0) {
       for (const Column& column : columns) std::printf("  %20s", column.name);

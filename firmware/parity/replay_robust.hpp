@@ -111,6 +111,7 @@ class RobustReplay {
     Sensor sensor;
     sensor.params.sigma_range_m = read();
     sensor.params.sigma_leader_m = read();
+    sensor.params.lift_smallest();  // the noise of a record is not cut off at 0
     Filter filter{Plain(Process(params)), rule_};
     typename Filter::State x0;
     typename Filter::Covariance p0;
@@ -119,6 +120,7 @@ class RobustReplay {
     for (int i = 0; i < Process::kStates; ++i) {
       for (int j = 0; j <= i; ++j) p0(i, j) = read();
     }
+    filter.limit_steps(math::infinity());  // a record goes to the ends of the format
     stream_.write(static_cast<std::uint32_t>(filter.reset(x0, p0)));
     Taker<Filter, Sensor> taker(filter);
     for (std::uint32_t k = 0; k < steps_; ++k) step(taker, sensor);

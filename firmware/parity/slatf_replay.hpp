@@ -9,6 +9,8 @@
 //             then per reading of the odometry: dt, the reading (2), the velocity change of each
 //             master that there is room for, the number of echoes, and of each: seconds since the
 //             reading began, range, bearing, master
+// Nobody is born again, and the covariance is that of the particles alone: the paper.
+//
 //     trace:  statuses of reset and of each add_master, then per reading with echoes: all numbers
 //             of all particles, slave x and P, each master's x, P and, of an Imm, probabilities of
 //             its models, log likelihood with what else the filter tells, status
@@ -160,6 +162,7 @@ class Replay {
     read(motion);
     read(master);
     params.gate = gate_;
+    params.recover_after = 0;
     Filter filter(motion, master, params);
     start(filter, [this](Filter& f, const typename Filter::SlaveBelief& slave) {
       return f.reset(slave, random_);
@@ -189,6 +192,8 @@ class Replay {
   }
 
   void fill(SlatfParams<float>& params) const {
+    params.monte_carlo = false;
+    params.recover_after = 0;
     params.resample_below = resample_below_;
     params.carry_covariance = carry_covariance_;
     params.gate = gate_;
@@ -196,6 +201,7 @@ class Replay {
     params.birth_acceleration_m_s2 = birth_acceleration_m_s2_;
   }
   void fill(SlatfJointParams<float>& params) const {
+    params.recover_after = 0;
     params.resample_below = resample_below_;
     params.kept = kept_;
     params.gate = gate_;

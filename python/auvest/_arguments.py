@@ -138,6 +138,21 @@ def require_range(
             raise ValueError(f"{name} = {value} does not suit {dtype}: {what} leaves its range")
 
 
+def far_from_origin(name: str, place: Floats, dtype: DType) -> str:
+    """Say that coordinates, m, are too large for a precision, and what to do."""
+    coordinates = [float(value) for value in place if math.isfinite(value)]
+    largest = max(coordinates, key=abs)
+    step = float(np.spacing(np.abs(dtype.type(largest))))
+    unit = 10.0 ** max(0, math.floor(math.log10(abs(largest))) - 2)
+    origin = ", ".join(f"{round(value / unit) * unit:.0f}" for value in coordinates)
+    given = ", ".join(f"{value:.10g}" for value in coordinates)
+    return (
+        f"{name} = ({given}) is too far from the origin: {dtype.name} tells {step:.3g} m apart "
+        f"there, which is coarse against the sigmas. Subtract a local origin, such as ({origin}), "
+        "from all coordinates"
+    )
+
+
 def as_pair(name: str, value: object) -> tuple[float, float]:
     """Take two finite numbers, for example a position."""
     array = as_array(name, value, (2,), np.dtype(np.float64))

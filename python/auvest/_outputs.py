@@ -54,8 +54,8 @@ class NewFolder:
         Replace the results of another command too, and set aside for good, as ``NAME.old``, a
         folder that auvest has not made.
     precious : bool
-        What was written cannot be made again: an unfinished folder is then not removed without
-        ``force``.
+        What was written cannot be made again: it stays where it is if it is not published, and no
+        other run removes it without ``force``.
 
     Attributes
     ----------
@@ -65,6 +65,8 @@ class NewFolder:
         Where to write until it is published.
     kept : Path or None
         Where what auvest had not made was set aside.
+    left : Path or None
+        Where what is precious and was not published is.
 
     Raises
     ------
@@ -79,8 +81,10 @@ class NewFolder:
     ) -> None:
         self.path = path
         self.kept: Path | None = None
+        self.left: Path | None = None
         self._command = command
         self._force = force
+        self._precious = precious
         self._lock = -1
         absolute = Path.cwd() / path
         if absolute.name in ("", "..") or path.name == "":
@@ -119,9 +123,13 @@ class NewFolder:
         OSError
             If it cannot be done; ``part`` stays for :meth:`discard`.
         """
+        from concurrent.futures import ThreadPoolExecutor  # here, because it is slow to import
+
         _write_manifest(self.part, self._command, "interrupted" if interrupted else "whole")
-        for found in (*self.part.rglob("*"), self.part):
-            _to_disk(found)
+        # Together, because the disk then does them at once.
+        found = [*self.part.rglob("*"), self.part]
+        with ThreadPoolExecutor(min(16, len(found))) as pool:
+            list(pool.map(_to_disk, found))
         with HeldInterrupts() as held, held:
             try:
                 ours = self._require_ours()
@@ -137,10 +145,14 @@ class NewFolder:
                 _remove(self._old)
 
     def discard(self) -> None:
-        """Remove what was written, unless it is published; safe to call at any time."""
+        """Remove what was written, unless it is published or precious; safe to call at any time."""
         if self._lock >= 0:
+            if self._precious and _names(self.part) - {MANIFEST}:
+                self.left = self.part
+                self._unlock()
+                return
             with contextlib.suppress(OSError):
-                shutil.rmtree(self.part)
+                _remove(self.part)
                 for folder in self._made:
                     folder.rmdir()  # unless somebody has put something there
             self._unlock()
@@ -191,9 +203,10 @@ class NewFolder:
         """Remove what was stopped before it was finished, if it is ours and nobody writes it."""
         shown = self.path.with_name(self.part.name)
         there = _names(self.part) if _is_folder(self.part) else {""}
-        if not (there <= {MANIFEST} or "command" in _manifest(self.part)):
+        unsigned = all(name.startswith(MANIFEST) for name in there)  # stopped at the very beginning
+        if not (unsigned or "command" in _manifest(self.part)):
             raise OutputError(f"{shown} is there, and auvest has not made it: move it away")
-        if precious and there - {MANIFEST}:
+        if precious and not unsigned:
             raise OutputError(
                 f"{shown} holds what was recorded when auvest was stopped: move it away, or "
                 "remove it with --force"
@@ -202,7 +215,7 @@ class NewFolder:
         try:
             if lock < 0:
                 raise OutputError(f"{shown} is being written by another auvest")
-            shutil.rmtree(self.part)
+            _remove(self.part)
         finally:
             if lock >= 0:
                 os.close(lock)

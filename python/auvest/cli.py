@@ -62,6 +62,9 @@ COMMANDS: Mapping[tuple[str, ...], str] = {
     ("reproduce", "mistakes"): (
         "Put the usual mistakes into clean simulated logs, and see what 'auvest check' says."
     ),
+    ("reproduce", "slat-robust"): (
+        "SLAT filters that know how far off they are, and find a lost master again."
+    ),
     ("reproduce", "mrclam6"): (
         "Track real robots that see each other, with one setting for all tracks."
     ),

@@ -112,6 +112,8 @@ class RejectionStreak(Checked):
     A rejection counts 4 up, or 7 if it repeats the innovation of a recent one seen along the same
     line, or 1 if it contradicts that; an acceptance counts 2 down. At ``4 * rejections`` the
     position variance grows until the worst of the rejected innovations would stand at one sigma.
+    That is done five times at once and then once in fifty measurements: recoveries that repeat are
+    a wrong model, and the filter's ``status`` is then ``Status.recoveries_repeat``.
 
     Parameters
     ----------

@@ -137,8 +137,10 @@ def _number(name: str, cell: str) -> float:
         return math.nan
     if name not in _DECIMAL and _BITS.fullmatch(cell):
         return struct.unpack(">f", bytes.fromhex(cell))[0]
-    if cell == "ovf":
+    if cell in ("ovf", "nan"):  # what Arduino prints where there is no number
         return math.nan
-    if not _DECIMALS.fullmatch(cell):  # float() also takes what no sketch sends: 1_0, nan, letters
+    if not _DECIMALS.fullmatch(
+        cell
+    ):  # float() also takes what no sketch sends: 1_0, foreign digits
         raise ValueError(cell)
     return float(cell)

@@ -9,6 +9,7 @@ refused has changed nothing. After one that was not, all numbers are finite and 
 from __future__ import annotations
 
 import copy
+import inspect
 import math
 import pickle
 import random
@@ -207,6 +208,8 @@ class Calls:
         if entry.cls == "SlatfJoint":
             options["kept"] = v.positive(1)
             options["max_masters"] = rng.choice(("1", "2"))
+            if "covariance" in inspect.signature(auvest.SlatfJoint).parameters:
+                options["covariance"] = rng.choice(("'shared'", "'particle'"))
         arguments = ", ".join(f"{name}={value}" for name, value in options.items())
         made = f"{entry.cls}({v.vector(n, 20)}, {v.covariance(n)}, {arguments})"
         calls = self.repeated(lambda: self.slat_call(n))
@@ -342,16 +345,17 @@ def suits(name: str, process: auvest.ProcessModel) -> bool:
     return True
 
 
+#: Calls that leave the object as it was, and are never refused.
+KEEPING = (
+    "f.restore(f.save())",
+    "f = pickle.loads(pickle.dumps(f))",
+    "f = copy.deepcopy(f)",
+    "repr(f)",
+)
+
+
 def kept(rng: random.Random) -> str:
-    """A call that leaves the object as it was."""
-    return rng.choice(
-        (
-            "f.restore(f.save())",
-            "f = pickle.loads(pickle.dumps(f))",
-            "f = copy.deepcopy(f)",
-            "repr(f)",
-        )
-    )
+    return rng.choice(KEEPING)
 
 
 # ---- What must hold.
@@ -472,6 +476,8 @@ class Interface:
             require_answer(f, call, answer)
         else:
             counts["refused"] += 1
+            if call in KEEPING:
+                raise Failed(f"{name}: its own state is refused", f"{call}: {error!r}")
             stays = not isinstance(error, auvest.FilterError) or error.step is None
             if stays and state_of(f) != before:
                 raise Failed(f"{name}: changed by a refusal", f"{call}: {error!r}")

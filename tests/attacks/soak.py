@@ -91,6 +91,18 @@ def gaussian(cls: str) -> Callable[[str], Any]:
     )
 
 
+def igg(dtype: str) -> Any:
+    """Ranges to two leaders, and a kernel whose weight jumps: see docs/algorithms/mekf.md."""
+    return auvest.RobustEkf(
+        [160, 0],
+        np.eye(2),
+        process=auvest.SpeedHeading(),
+        sensors=auvest.LeaderRange(),
+        kernel="igg",
+        dtype=dtype,
+    )
+
+
 def slatf(dtype: str) -> Any:
     made = auvest.Slatf(
         [160, 0],
@@ -119,9 +131,15 @@ def chunk(filters: list[Any], first: int) -> tuple[list[Any], Floats]:
         z += rng.normal(size=z.shape) * [1.0, 0.03]
         even = slice(1, None, 2)
         return [f.run(times, u, z=z[even], z_time_s=times[1:][even]) for f in filters], truth
-    z = seen(truth, rng)
     speed = SPEED_M_S + rng.normal(0, 0.1, CHUNK)
     driven = np.column_stack([speed, np.zeros(CHUNK), heading(k)])
+    if "LeaderRange" in filters[0].sensors:
+        place = np.where((k % 2 == 0)[:, None], [0.0, 0.0], [100.0, 200.0])
+        ranges = np.hypot(*(truth - place).T) + rng.normal(size=CHUNK)
+        off = rng.random(CHUNK) < 0.05
+        ranges[off] = np.abs(ranges[off] + rng.uniform(-100, 100, off.sum()))
+        return [f.run(ranges, dt=1.0, input=driven, place=place) for f in filters], truth
+    z = seen(truth, rng)
     results = []
     for f in filters:
         inputs = driven if f.process.input else None
@@ -173,12 +191,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--steps", type=float, default=1e6)
     parser.add_argument("--seconds", type=float, default=np.inf, help="at most, for each filter")
-    parser.add_argument("--filter", help="only this class")
+    parser.add_argument("--filter", help="only this one")
     given = parser.parse_args()
     makers = {
         entry.cls: gaussian(entry.cls) for entry in FILTERS.values() if entry.family == "gaussian"
     }
-    makers["Slatf"] = slatf
+    makers |= {"RobustEkf-igg": igg, "Slatf": slatf}
     right = True
     print(
         "filter      steps  not finite  smallest  RMSE float32, float64  apart  otherwise  memory"
@@ -189,7 +207,7 @@ def main() -> None:
             right = right and holds(found)
             rmse = np.sqrt(found.squares / max(1, found.steps))
             print(
-                f"{name:9} {found.steps:9} {found.not_finite:6} {found.smallest:12.2e} "
+                f"{name:13} {found.steps:9} {found.not_finite:6} {found.smallest:12.2e} "
                 f"{rmse[0]:9.4f} m {rmse[1]:8.4f} m {found.apart_m:9.3g} m ({found.worst}) "
                 f"{found.otherwise:6} {found.memory_mb[0]:6.0f} -> {found.memory_mb[1]:.0f} MB",
                 flush=True,

@@ -8,6 +8,7 @@
 
 #include "auvest/math/angle.hpp"
 #include "auvest/math/exponential.hpp"
+#include "auvest/math/resolution.hpp"
 #include "auvest/math/trigonometry.hpp"
 
 class ExplicitDouble {
@@ -76,6 +77,9 @@ inline ExplicitDouble exp(ExplicitDouble x) { return ExplicitDouble(exp(double(x
 inline ExplicitDouble log(ExplicitDouble x) { return ExplicitDouble(log(double(x))); }
 inline ExplicitDouble exp_normal(ExplicitDouble x) { return exp(x); }
 inline ExplicitDouble log_normal(ExplicitDouble x) { return log(x); }
+inline bool is_coarse(ExplicitDouble x, ExplicitDouble variance) {
+  return is_coarse(double(x), double(variance));
+}
 inline ExplicitDouble sqrt(ExplicitDouble x) { return ExplicitDouble(sqrt(double(x))); }
 inline ExplicitDouble absolute(ExplicitDouble x) { return ExplicitDouble(absolute(double(x))); }
 inline ExplicitDouble copy_sign(ExplicitDouble x, ExplicitDouble y) {

@@ -34,6 +34,7 @@ def test_every_filter_and_example_is_measured(rows, root):
     examples = {path.name for path in (root / "firmware/library/examples").iterdir()}
     filters = {"ekf", "ukf", "aukf", "aukf_covariance_budget", "slatf1", "slatf2"}
     filters |= {"robust_ekf_predict", "robust_ekf_update"}
+    filters |= {"unknown_start_predict", "unknown_start_update"}
     filters |= {"slatf_joint", "ekf_slat", "ekf_slat_imm"}
     assert rows.keys() >= examples | filters | {"empty"}
 
@@ -50,6 +51,12 @@ def test_slatf_sleeps_half_of_the_sonar_period(rows):
 def test_a_range_takes_at_most_15_000_cycles(rows):
     """In the worst case: weighted down, rejected, or with a recovery."""
     assert rows["robust_ekf_update"].cycles_max <= 15_000
+
+
+def test_an_unknown_start_costs_a_range_little_once_it_is_known(rows):
+    """With one component; with sixteen it must be done well before the next range, 5 s later."""
+    assert rows["unknown_start_update"].cycles_median <= 17_000
+    assert rows["unknown_start_update"].cycles_max <= 0.1 * 16e6
 
 
 def test_guidance_and_control_take_at_most_20_000_cycles(rows):

@@ -12,7 +12,8 @@ from tests.parity.records import GIVEN_INTERVAL, LOWER, MEASURED, REFERENCED, TR
 
 def replay_in_python(record: Record) -> np.ndarray:
     """Run a record through the public classes and give its trace."""
-    models = {"process": record.process, "sensors": record.sensor, "dtype": "float32"}
+    models = {"process": record.process, "sensors": record.lifted_sensor, "dtype": "float32"}
+    models["longest_step_s"] = np.inf
     if record.kind == "ekf":
         estimator = Ekf(record.x0, record.P0, **models)
     elif record.kind == "ukf":

@@ -113,6 +113,7 @@ class RobustRecord:
             recovery=recovery,
             residual=self.residual,
             late_s=self.late_s,
+            longest_step_s=np.inf,
             dtype="float32",
         )
         trace = np.zeros(len(self.steps), trace_type(self.states))
@@ -132,7 +133,7 @@ class RobustRecord:
                     row["decision"], row["iterations"] = int(r.decision), r.iterations
                     row["recovered"] = r.recovered
             row["x"], row["P"] = bits(f.x), bits(f.P[lower])
-            count, variance, *recent = f._filter.save()[0]["recovery"]
+            count, variance, *recent, _ = f._filter.save()[0]["recovery"]
             row["count"], row["variance"], row["recent"] = count, bits(variance), bits(recent)
         return trace
 
@@ -141,6 +142,7 @@ class RobustRecord:
             leader=tuple(float(v) for v in step["leader"]),
             sigma_range_m=self.sensor.sigma_range_m,
             sigma_leader_m=self.sensor.sigma_leader_m,
+            smallest_range_m=-float(np.finfo(np.float32).max),  # noise is not cut off at 0
         )
 
 

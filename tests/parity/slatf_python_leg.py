@@ -49,7 +49,7 @@ def _filter(record: Record, lanes: str) -> SlatFilter:
     slave = record.world.slave
     start = slave["x"], _symmetric(slave["P"], record.motion.pose_states)
     models: dict[str, Any] = {"motion": record.motion, "sonar": record.sonar, "gate": record.gate}
-    models |= {"master": record.master, "dtype": "float32"}
+    models |= {"master": record.master, "dtype": "float32", "recover_after": 0}
     if record.kind.startswith("ekf"):
         return EkfSlat(*start, **models)
     particles = {"particles": record.particles, "seed": record.seed}
@@ -64,6 +64,7 @@ def _filter(record: Record, lanes: str) -> SlatFilter:
         carry_covariance=record.carry_covariance,
         birth_velocity_m_s=record.birth_velocity_m_s,
         birth_acceleration_m_s2=record.birth_acceleration_m_s2,
+        monte_carlo=False,
         lanes=lanes,
     )
 

@@ -76,6 +76,8 @@ def slat_result(error: Any, **columns: Any) -> slat.SlatResult:
         "nis": blank,
         "resamplings": none,
         "heard": none,
+        "refused": none,
+        "rebirths": none,
         "log_likelihood": np.zeros(runs),
         "status": np.zeros(runs, np.uint8),
     }

@@ -136,6 +136,36 @@ def test_samples_need_the_names_of_their_columns() -> None:
         reader.read(telemetry.frame("AUV," + ",".join(["one"] * 23)))
 
 
+@pytest.mark.parametrize(
+    ("cell", "message"),
+    [
+        ("1_0", "not a number"),
+        ("\u0661", "no character of a serial line"),  # one, to float()
+        ("infinity", "not a number"),
+        (" 1", "not a number"),
+        ("0x10", "not a number"),
+    ],
+)
+def test_a_number_that_no_sketch_sends_is_a_damaged_line(cell: str, message: str) -> None:
+    reader = Reader()
+    reader.read("# columns: sample,a")
+    line = f"$AUV,1,{cell}*00" if not cell.isascii() else telemetry.frame(f"AUV,1,{cell}")
+    with pytest.raises(LineError, match=message):
+        reader.read(line)
+    assert telemetry.requested_sample(f"$PING,{cell}*00") is None
+    if cell.isascii():
+        assert telemetry.requested_sample(telemetry.frame(f"PING,{cell}")) is None
+
+
+@pytest.mark.parametrize("names", ["sample,time_s,sample", "sample,,a", "sample,ti\u00e9me", "1a"])
+def test_damaged_names_of_columns_are_refused_and_the_last_ones_stay(names: str) -> None:
+    reader = Reader()
+    reader.read("# columns: sample,a")
+    with pytest.raises(LineError, match="names of the columns are damaged"):
+        reader.read(f"# columns: {names}")
+    assert reader.columns == ("sample", "a")
+
+
 def test_other_lines_are_no_samples() -> None:
     reader = Reader()
     for line in ("", "# bytes of RAM never used: 5000", telemetry.frame("PING,3")):
@@ -460,3 +490,23 @@ def test_without_the_simulator_its_build_is_told(
     result = call("--simulator", __file__, "--output", str(tmp_path))
     assert result.exit_code == 1
     assert "AUVEST_BUILD_FIRMWARE" in plain(result.stderr)
+
+
+def test_a_record_stays_if_what_comes_after_it_fails(
+    port: PortWithBoard, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def script(board: PortWithBoard) -> None:
+        board.say(HEADER)
+        for k in range(1, 4):
+            board.say(sample_line(k))
+
+    def full(*_: object) -> None:
+        raise OSError("no space left")
+
+    monkeypatch.setattr(capture, "_figure", full)
+    port.speak(script)
+    result = call("--port", port.name, "--steps", "3", "--output", str(tmp_path / "dive"))
+    assert result.exit_code == 1
+    assert "what was recorded is in" in plain(result.stderr)
+    assert lines_of(tmp_path / "dive.unfinished" / "record.csv") == 4
+    assert not (tmp_path / "dive").exists()

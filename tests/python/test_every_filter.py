@@ -912,3 +912,217 @@ def test_an_adaptive_filter_may_be_robust():
         else:
             assert outliers == 0
             assert worst > 0.5
+
+
+# ---- Clocks that jump, ranges that are none, coordinates without a local origin.
+
+
+@pytest.mark.parametrize(("kind", "name", "dtype"), PRECISE_CASES)
+def test_a_step_longer_than_the_longest_is_refused_and_changes_nothing(kind, name, dtype):
+    rows = record(ALL[name])
+    given = None if rows.input is None else rows.input[0]
+    f = make(kind, name, dtype)
+    assert f.longest_step_s == 3600
+    rows[:5].drive(f)
+    before = readable(f)
+    for dt in (3601.0, 86400.0, 1.7e9):  # a clock of its own, a day, seconds since 1970
+        with pytest.raises(FilterError, match=r"longer than longest_step_s = 3600 s") as caught:
+            f.predict(dt, given)
+        assert caught.value.status == Status.step_too_long
+        assert readable(f) == before
+    assert f.status == Status.step_too_long
+    f.predict(3600.0, given)
+    assert f.status == Status.ok
+
+    limited = make(kind, name, dtype, longest_step_s=0.25)
+    limited.predict(0.25, given)
+    with pytest.raises(FilterError, match=r"dt = 0\.26 s is longer than longest_step_s = 0\.25 s"):
+        limited.predict(0.26, given)
+    unlimited = make(kind, name, dtype, longest_step_s=INF)
+    unlimited.predict(7200.0, given)
+
+
+@pytest.mark.parametrize(("kind", "name", "dtype"), PRECISE_CASES)
+def test_a_run_ends_before_a_row_with_a_clock_that_jumped_and_goes_on_behind_it(kind, name, dtype):
+    rows = record(ALL[name])
+    a, b = (make(kind, name, dtype) for _ in range(2))
+    jumped = copy.deepcopy(rows)
+    jumped.dt[20] = 5000.0
+    with pytest.raises(FilterError, match=r"run at row 20: dt = 5000 s is longer") as caught:
+        jumped.run(a)
+    assert caught.value.step == 20
+    assert caught.value.status == Status.step_too_long
+    require_same(caught.value.partial, rows[:20].run(b))
+    require_same(rows[20:].run(a), rows[20:].run(b))
+
+
+def range_sensors(process):
+    return {
+        name: model
+        for name, model in sensors_for(process).items()
+        if hasattr(model, "smallest_range_m")
+    }
+
+
+@pytest.mark.parametrize(("kind", "name", "dtype"), PRECISE_CASES)
+def test_a_range_that_the_sensor_cannot_measure_is_refused_by_name(kind, name, dtype):
+    x0 = start(ALL[name])[0]
+    f = make(kind, name, dtype)
+    before = readable(f)
+    assert range_sensors(ALL[name])
+    for sensor, model in range_sensors(ALL[name]).items():
+        z = model.h(x0)
+        z[0] = -1.0
+        with pytest.raises(
+            FilterError,
+            match=rf"{sensor} cannot measure a range of -1 m; its ranges are 0 to inf m",
+        ) as caught:
+            f.update(z, sensor)
+        assert caught.value.status == Status.impossible_range
+        assert readable(f) == before
+        limited = dataclasses.replace(model, smallest_range_m=1.0, largest_range_m=500.0)
+        for none in (0.0, 0.99, 500.1, 9999.0):
+            z[0] = none
+            with pytest.raises(FilterError, match=r"its ranges are 1 to 500 m") as caught:
+                f.update(z, limited)
+            assert caught.value.status == Status.impossible_range
+            assert readable(f) == before
+        f.update(np.full(len(z), NAN), limited)  # missing
+        assert f.status == Status.ok
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_run_ends_before_a_row_with_a_negative_range(kind):
+    f = make(kind, "SpeedHeading")
+    with pytest.raises(
+        FilterError, match=r"run at row 2: LeaderRange cannot measure a range of -1"
+    ):
+        f.run(
+            [40.0, NAN, -1.0, 40.0],
+            dt=0.1,
+            input=np.zeros((4, 3)),
+            sensor=auvest.LeaderRange(leader=(1.0, 2.0)),
+        )
+
+
+EAST, NORTH = 388096.0, 3948996.0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_coordinates_without_a_local_origin_are_refused_in_float32(kind):
+    """A metre of a craft at a northing of UTM is four numbers of float32."""
+    motion = {"process": auvest.SpeedHeading(), "sensors": auvest.LeaderRange()}
+    P0 = np.eye(2) * 0.01
+    with pytest.raises(
+        ValueError,
+        match=r"x0 = \(388096, 3948996\) is too far from the origin: float32 tells "
+        r"0\.25 m apart there.*Subtract a local origin, such as \(390000, 3950000\)",
+    ):
+        kind([EAST, NORTH], P0, dtype="float32", **motion)
+    fine = kind([EAST, NORTH], P0, **motion)
+    for _ in range(500):
+        fine.predict(0.1, [0.5, 0.0, 0.0])
+    assert fine.x[0] - EAST == pytest.approx(25.0, abs=0.01)
+
+    f = kind([0.0, 0.0], P0, dtype="float32", **motion)
+    far = auvest.LeaderRange(leader=(EAST, NORTH), sigma_range_m=0.5)
+    with pytest.raises(
+        ValueError, match=r"leader = \(388096, 3948996\) is too far from the origin"
+    ):
+        f.update([10.0], far)
+    with pytest.raises(FilterError, match=r"place = \(388096, 3948996\) is too far") as caught:
+        f.update([10.0], auvest.LeaderRange(sigma_range_m=0.5), place=(EAST, NORTH))
+    assert caught.value.status == Status.far_from_origin
+    with pytest.raises(ValueError, match=r"station = \(388096, 3948996\) is too far"):
+        kind(
+            [0.0, 0.0],
+            P0,
+            process=auvest.SpeedHeading(),
+            sensors=auvest.RangeBearing(station=(EAST, NORTH)),
+            dtype="float32",
+        )
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_filter_that_drifts_far_from_its_origin_says_so(kind):
+    f = kind([0.0, 0.0], np.eye(2) * 0.01, process=auvest.SpeedHeading(), dtype="float32")
+
+    def drift():
+        for _ in range(3000):
+            before[:] = f.x, f.P
+            f.predict(1.0, [5e4, 0.0, 0.0])
+
+    before = []
+    with pytest.raises(FilterError, match=r"x = \(.*\) is too far from the origin") as caught:
+        drift()
+    assert caught.value.status == f.status == Status.far_from_origin
+    assert same_bits(f.x, before[0])
+    assert same_bits(f.P, before[1])
+    # Half a unit in the last place is a tenth of sigma there, as it was when it began to be.
+    half = 0.5 * float(np.spacing(f.x[0]))
+    assert half / math.sqrt(f.P[0, 0]) < 1 / 7.9
+
+
+@pytest.mark.parametrize("what", ["ranges", "range and bearing", "fixes"])
+@pytest.mark.parametrize("kind", [auvest.RobustEkf, auvest.RobustUkf, auvest.Ckf])
+def test_a_robust_filter_comes_back_from_a_bad_time_stamp_within_the_limit(kind, what):
+    """A prediction of 50 min by mistake takes the estimate 3 km away.
+
+    Ranges alone have another solution where the belief is wider than the leaders are apart; the
+    points of a Ukf do not decide it, and its covariance says so.
+    """
+    rng = np.random.default_rng(0)
+    options = (
+        {}
+        if issubclass(kind, auvest.RobustEkf | auvest.RobustUkf)
+        else {"kernel": "hampel", "recovery": auvest.RejectionStreak()}
+    )
+    f = kind([0.0, 0.0], np.eye(2) * 4, process=auvest.SpeedHeading(), **options)
+    leaders = [(200.0, 0.0), (0.0, 200.0), (-200.0, -100.0)]
+    truth = np.zeros(2)
+    errors = []
+    for k in range(200):
+        motion = [1.0, 0.0, 0.02 * k]
+        f.predict(1.0, motion)
+        truth += [math.cos(motion[2]), math.sin(motion[2])]
+        if k == 50:
+            f.predict(3000.0, motion)
+        leader = leaders[k % 3]
+        away = truth - leader
+        if what == "ranges":
+            f.update(np.hypot(*away) + rng.normal(), auvest.LeaderRange(leader=leader))
+        elif what == "fixes":
+            f.update(truth + rng.normal(size=2), auvest.Position())
+        else:
+            sonar = auvest.RangeBearing(station=leader, sigma_range_m=1.0)
+            z = [np.hypot(*away) + rng.normal(), np.arctan2(away[1], away[0])]
+            f.update(z + np.array([0.0, 0.01 * rng.normal()]), sonar)
+        errors.append(np.hypot(*(f.x - truth)))
+    assert max(errors[40:50]) < 3
+    assert errors[50] > 2900
+    if (kind, what) == (auvest.RobustUkf, "ranges"):
+        assert max(errors[-10:]) < 2 * math.sqrt(np.trace(f.P))
+        return
+    assert max(errors[95:]) < 10
+    assert f.status == Status.ok
+
+
+def test_recoveries_that_repeat_are_named_and_end():
+    """Ranges that are a fifth too long: no belief is right, however wide."""
+    rng = np.random.default_rng(1)
+    f = auvest.RobustEkf([0.0, 0.0], np.eye(2), process=auvest.SpeedHeading(), kernel="igg")
+    leaders = np.array([(300.0, 0.0), (-150.0, 260.0), (-150.0, -260.0)])
+    truth, recovered, named = np.zeros(2), 0, 0
+    for k in range(600):
+        motion = [1.0, 0.0, 0.02 * k]
+        f.predict(2.0, motion)
+        truth += 2 * np.array([math.cos(motion[2]), math.sin(motion[2])])
+        z = 1.2 * np.hypot(*(truth - leaders[k % 3])) + rng.normal()
+        f.update(z, auvest.LeaderRange(leader=leaders[k % 3]))
+        recovered += f.report.recovered
+        named += f.status == Status.recoveries_repeat
+    assert 5 <= recovered <= 5 + 600 / 50
+    assert named > 0
+    twin = copy.deepcopy(f)
+    pickled = pickle.loads(pickle.dumps(f))
+    assert twin.status == pickled.status == f.status

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from auvest.logs import LogFolder
+from auvest.logs import LogError, LogFolder
 from auvest.logs.importers import IMPORTERS
 
 
@@ -169,3 +169,51 @@ def test_ugps_pier59_leaves_out_polls_without_a_fix(tmp_path: Path) -> None:
             rtol=1e-15,
         )
         assert log.beacons() == {0: (0.0, 0.0)}
+
+
+# ---- What is refused -----------------------------------------------------------------------------
+
+
+def test_a_recording_is_never_written_into(tmp_path: Path) -> None:
+    """Where the log would take the place of its source, or stand in it, or hold it."""
+    source = tmp_path / "data" / "goats14"
+    source.mkdir(parents=True)
+    for name, text in goats(0.25).items():
+        (source / name).write_text(text)
+    before = {path.name: path.read_bytes() for path in source.iterdir()}
+    for output in (tmp_path / "data", source, source / "logs"):
+        with pytest.raises(ValueError, match="in or above its source"):
+            IMPORTERS["goats14"](source, output, force=True)
+    assert {path.name: path.read_bytes() for path in source.iterdir()} == before
+    assert [path.name for path in (tmp_path / "data").iterdir()] == ["goats14"]
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "message"),
+    [
+        ("odometry.csv", "-0.5", "nan", r"odometry.csv, line 3, column dtheta: nan is not a n"),
+        ("ranges.csv", "3,40.5", "3.5,40.5", r"ranges.csv, line 2, column beacon: 3.5 is not an i"),
+        ("ranges.csv", "3,40.5", "1e30,40.5", r"ranges.csv, line 2, column beacon: 1e\+30 is not "),
+        ("ranges.csv", "3,40.5", "3,-1", r"ranges.csv, row 0, column range_m: -1.0 is not a numb"),
+        ("ranges.csv", "3,40.5", "3,4_0", r"ranges.csv, line 2: '4_0' is not a number"),
+        ("ranges.csv", "3,40.5", "3,40.5#", r"ranges.csv, line 2: '40.5#' is not a number"),
+        ("ranges.csv", "1.5,3,40.5\n", "", r"ranges.csv: has no rows"),
+        ("ranges.csv", "3,40.5\n", "3,40.5", r"ranges.csv, line 2: does not end with a line end"),
+        ("ranges.csv", "3,40.5", "3", r"ranges.csv, line 2: 2 cells, expected 3"),
+    ],
+)
+def test_what_no_log_can_hold_is_refused_and_leaves_nothing(
+    tmp_path: Path, file: str, old: str, new: str, message: str
+) -> None:
+    files = goats(0.25)
+    assert old in files[file]
+    files[file] = files[file].replace(old, new, 1)
+    with pytest.raises(LogError, match=message):
+        imported(tmp_path, "goats14", files)
+    assert [path.name for path in tmp_path.iterdir()] == ["set"]
+
+
+def test_tables_may_begin_with_a_mark(tmp_path: Path) -> None:
+    files = {name: "\ufeff" + text for name, text in goats(0.25).items()}
+    log = imported(tmp_path, "goats14", files)["goats14"]
+    assert log.beacons() == {3: (10.0, -20.0)}

@@ -253,3 +253,42 @@ def test_bad_table(tmp_path: Path) -> None:
     columns = {"a": np.zeros(3)}
     with pytest.raises(ValueError, match=r"must end in \.csv or \.parquet, not 't\.xlsx'"):
         montecarlo.write_table(tmp_path / "t.xlsx", columns)
+
+
+def test_a_store_removes_only_what_is_its_own(tmp_path: Path) -> None:
+    store = tmp_path / "store"
+    options: dict[str, Any] = {"chunk": 5, "store": store}
+    montecarlo.run(task, 20, settings={"a": 1}, **options)
+    (store / "notes.txt").write_text("mine")
+    with pytest.raises(ValueError, match=r"holds what no run has written \('notes.txt'\)"):
+        montecarlo.run(task, 20, settings={"a": 2}, **options)
+    montecarlo.discard(store)
+    assert [path.name for path in store.iterdir()] == ["notes.txt"]
+    with pytest.raises(ValueError, match=r"notes\.txt"):
+        montecarlo.run(task, 20, settings={"a": 1}, **options)
+
+
+def test_a_folder_that_is_no_store_is_refused(tmp_path: Path) -> None:
+    """Whatever it is called, and chunks whose experiment nobody knows are no store either."""
+    for name in ("experiment", "0-4.npz"):
+        store = tmp_path / name.partition(".")[0]
+        store.mkdir()
+        (store / name).write_text("mine")
+        with pytest.raises(ValueError, match="holds what no run has written"):
+            montecarlo.run(task, 5, chunk=5, store=store, settings={})
+        montecarlo.discard(store)
+        assert (store / name).read_text() == "mine"
+
+
+def test_no_link_in_a_store_is_followed(tmp_path: Path) -> None:
+    (tmp_path / "victim").write_text("precious")
+    options: dict[str, Any] = {"chunk": 5, "store": tmp_path / "store", "settings": {}}
+    whole = montecarlo.run(task, 10, **options)
+    (tmp_path / "store" / "0-4.npz").unlink()
+    (tmp_path / "store" / "0-4.npz").symlink_to(tmp_path / "victim")
+    again = montecarlo.run(task, 10, **options)
+    assert again["value"].tobytes() == whole["value"].tobytes()
+    assert (tmp_path / "victim").read_text() == "precious"
+    (tmp_path / "link").symlink_to(tmp_path / "store")
+    with pytest.raises(ValueError, match="is a link"):
+        montecarlo.run(task, 10, **{**options, "store": tmp_path / "link"})

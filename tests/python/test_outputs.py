@@ -143,12 +143,37 @@ def test_what_was_stopped_is_removed_by_the_next_run(tmp_path: Path) -> None:
     assert files(tmp_path) == {"out/a.csv": "new"}
 
 
+@pytest.mark.parametrize("left", [(), (".auvest.json",), (".auvest.json.0123abcd.unfinished",)])
+def test_a_stop_at_the_very_beginning_is_in_nobodys_way(
+    tmp_path: Path, left: tuple[str, ...]
+) -> None:
+    (tmp_path / "out.unfinished").mkdir()
+    for name in left:
+        (tmp_path / "out.unfinished" / name).write_text("")
+    publish(tmp_path / "out")
+    assert files(tmp_path) == {"out/a.csv": "new"}
+
+
 def test_a_stop_between_the_two_names_is_mended(tmp_path: Path) -> None:
     publish(tmp_path / "out", text="old")
     (tmp_path / "out").rename(tmp_path / "out.old")  # and there it was stopped
     with pytest.raises(KeyError), NewFolder(tmp_path / "out", "replay"):
         raise KeyError
     assert files(tmp_path) == {"out/a.csv": "old"}
+
+
+def test_what_is_precious_stays_where_it_is(tmp_path: Path) -> None:
+    with (
+        pytest.raises(OSError, match="full"),
+        NewFolder(tmp_path / "out", "capture", precious=True),
+    ):
+        raise OSError("the disk is full")
+    assert list(tmp_path.iterdir()) == []  # nothing had come
+    new = NewFolder(tmp_path / "out", "capture", precious=True)
+    (new.part / "record.csv").write_text("1,2\n")
+    new.discard()
+    assert new.left == tmp_path / "out.unfinished"
+    assert files(tmp_path) == {"out.unfinished/record.csv": "1,2\n"}
 
 
 def test_an_unfinished_folder_of_somebody_else_is_refused(tmp_path: Path) -> None:
@@ -161,23 +186,33 @@ def test_an_unfinished_folder_of_somebody_else_is_refused(tmp_path: Path) -> Non
 
 def test_a_file_takes_its_name_when_it_is_whole(tmp_path: Path) -> None:
     (tmp_path / "t.csv").write_text("old")
-    with pytest.raises(KeyError), new_file(tmp_path / "t.csv", "w") as file:  # noqa: PT012
-        file.write("ne")
-        raise KeyError
+    with pytest.raises(TypeError), new_file(tmp_path / "t.csv", "w") as file:
+        file.writelines(["ne", 1])  # type: ignore[list-item]
     assert files(tmp_path) == {"t.csv": "old"}
 
 
 def test_ctrl_c_waits_for_what_must_be_whole() -> None:
-    done = []
-    with pytest.raises(KeyboardInterrupt), HeldInterrupts() as held:  # noqa: PT012
-        for part in range(3):
-            with held:
-                os.kill(os.getpid(), signal.SIGINT)
-                done.append(part)
-    assert done == [0]  # to its end, and no further
+    done: list[int] = []
+
+    def interrupted(part: int) -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+        done.append(part)
+
+    def whole() -> None:
+        with HeldInterrupts() as held:
+            for part in range(3):
+                with held:
+                    interrupted(part)
+
+    def outside() -> None:
+        with HeldInterrupts():
+            interrupted(7)
+
     before = signal.getsignal(signal.SIGINT)
-    with pytest.raises(KeyboardInterrupt), HeldInterrupts():  # noqa: PT012
-        os.kill(os.getpid(), signal.SIGINT)  # outside of the inner block it acts at once
-        done.append(1)
+    with pytest.raises(KeyboardInterrupt):
+        whole()
+    assert done == [0]  # to its end, and no further
+    with pytest.raises(KeyboardInterrupt):
+        outside()  # of the inner block it acts at once
     assert done == [0]
     assert signal.getsignal(signal.SIGINT) is before

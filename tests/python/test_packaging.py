@@ -159,7 +159,7 @@ def test_sdist_has_what_git_tracks(root, tmp_path, declared_version, run):
     code = "import backend, sys; print(backend.build_sdist(sys.argv[1]))"
     stray.write_text("not tracked, not ignored")
     try:
-        environment = {**os.environ, "PYTHONPATH": str(root / "packaging")}
+        environment = {**os.environ, "PYTHONPATH": str(root / "python")}
         run(sys.executable, "-c", code, tmp_path, cwd=root, env=environment)
     finally:
         stray.unlink()

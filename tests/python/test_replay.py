@@ -1090,4 +1090,11 @@ def test_ctrl_c_keeps_what_was_done(tmp_path: Path, million: Path) -> None:
     assert result["interrupted"]
     table = pa_parquet.read_table(output / "million" / "estimates.parquet")
     assert 0 < len(table) < 500_000
+    for name in ("estimates", "errors", "measurements"):  # all of the same moment
+        rows = len(pa_parquet.read_table(output / "million" / f"{name}.parquet"))
+        assert len(pa_csv.read_csv(output / "million" / f"{name}.csv")) == rows
+        if name in result:
+            assert result[name] == rows
+    with track.parent.with_name("million").joinpath("trajectory.tum").open() as file:
+        assert sum(1 for _ in file) == len(table)
     assert "interrupted" in (output / "million" / "report.html").read_text()

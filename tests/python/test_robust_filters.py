@@ -365,3 +365,28 @@ def test_without_a_recovery_nothing_ends_a_lock_out(kind):
         assert not alone.report.recovered
         assert same_bits(alone.P, start)
     assert helped.P[0, 0] > 100 * start[0, 0]
+
+
+@pytest.mark.parametrize(("kernel", "jump"), [("igg", 1.5 / 3.0), ("hampel", 0.0), ("huber", 0.0)])
+def test_two_precisions_part_where_a_weight_jumps(kernel, jump):
+    """A residual that stands at IGG's k1 to the last digits is half believed, or rejected."""
+    p, r = 0.5, 1.0
+    f = auvest.RobustEkf(
+        [0, 0],
+        p * np.eye(2),
+        kernel=kernel,
+        process=SpeedHeading(),
+        sensors=LeaderRange(leader=(100, 0)),
+    )
+    edge = {"igg": auvest.Igg().k1, "hampel": auvest.Hampel().c, "huber": auvest.Huber().k}[kernel]
+    probe = copy.deepcopy(f)
+    probe.update(100.0)  # says where the innovation is 0, and S
+    at_the_edge = 100.0 - probe.innovation[0] - edge * np.sqrt(probe.S[0, 0])
+    ends = []
+    for off in (-1e-6, 1e-6):  # what float32 makes of 100 m
+        one = copy.deepcopy(f)
+        one.update(at_the_edge + off)
+        ends.append(one.x)
+    # With the weight w the noise is r / w, and the innovation is `edge` times its deviation.
+    wanted = p / (p + r / jump) * edge * np.sqrt(p + r) if jump else 0.0
+    assert np.hypot(*(ends[1] - ends[0])) == pytest.approx(wanted, rel=1e-4, abs=1e-5)

@@ -203,7 +203,8 @@ def test_a_million_steps_through_the_station(alpha):
     f = auvest.Ukf(
         [*STATION, 0.26, 0.31, 0.0, 0.0],
         np.diag([0.01, 0.01, 0.01, 0.01, 1e-4, 1e-4]),
-        **{**PAPER, "process": auvest.ConstantAcceleration(velocity_psd=1e-3)},
+        **{**PAPER, "process": auvest.ConstantAcceleration(velocity_psd=1e-3)}
+        | {"sensors": auvest.RangeBearing(smallest_range_m=-1.0)},  # noise is not cut off at 0
         alpha=alpha,
         dtype="float32",
     )

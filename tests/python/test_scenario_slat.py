@@ -112,7 +112,7 @@ def test_variants_reach_the_filter() -> None:
     wild = replace(SHORT, outlier=0.1, runs=20)
     bare, gated = (simulate(EkfSlat(START, CERTAIN, gate=g), wild).rmse_m for g in (0, 16))
     assert bare > 3 * gated
-    stiff = EkfSlat(START, CERTAIN, master=PiecewiseAcceleration(acceleration_m_s2=0))
+    stiff = EkfSlat(START, CERTAIN, master=PiecewiseAcceleration(acceleration_m_s2=0), gate=0)
     turning = SlatScenario(runs=5)
     assert simulate(stiff, turning).rmse_m < 50
     assert simulate(stiff, replace(turning, plan_known=False)).rmse_m > 100

@@ -218,7 +218,8 @@ def test_ekf_slat_is_the_textbook_filter(bearing: Any) -> None:
     q, dt = 0.02, 0.5
     sonar = Sonar(sigma_range_m=2, sigma_bearing_rad=0.1, bearing=bearing)
     p0 = np.array([[4.0, 1.0], [1.0, 9.0]])
-    filter_ = EkfSlat(START, p0, master=PiecewiseAcceleration(acceleration_m_s2=q), sonar=sonar)
+    master = PiecewiseAcceleration(acceleration_m_s2=q)
+    filter_ = EkfSlat(START, p0, master=master, sonar=sonar, gate=0)
     filter_.add_master(MASTER_X, 25 * np.eye(6))
     filter_.add_master(SECOND_X, 16 * np.eye(6))
     changes = np.array([[0.2, -0.1], [0.05, 0.3]])
@@ -289,7 +290,8 @@ def test_many_particles_come_near_the_joint_filter() -> None:
 
 
 def test_weights_and_poses_give_the_mean() -> None:
-    filter_ = with_masters(Slatf(START, np.eye(2), version=1, resample_below=0))
+    open_ = {"resample_below": 0, "gate": 0, "monte_carlo": False}
+    filter_ = with_masters(Slatf(START, np.eye(2), version=1, **open_))
     filter_.run(**record(12))
     w, poses = filter_.weights, filter_.poses
     assert w.sum() == pytest.approx(1, rel=1e-12)
@@ -432,7 +434,7 @@ BAD_MAKE: list[tuple[dict[str, Any], str]] = [
     ({"resample_below": 1.5}, r"resample_below must lie in 0\.\.1, not 1.5"),
     ({"gate": -1}, "gate must not be negative"),
     ({"carry_covariance": 1}, "carry_covariance must be True or False"),
-    ({"birth_velocity_m_s": 1}, "birth_velocity_m_s needs a gate"),
+    ({"birth_velocity_m_s": 1, "gate": 0}, "birth_velocity_m_s needs a gate"),
     ({"birth_acceleration_m_s2": 0}, "birth_acceleration_m_s2 must be positive"),
     ({"motion": Sonar()}, "motion must be an auvest.CompassMotion or auvest.UnicycleMotion"),
     ({"master": None}, "master must be an auvest.PiecewiseAcceleration"),

@@ -41,7 +41,12 @@ MAKE: dict[str, Callable[..., Any]] = {
         x, p, particles=20, gate=16, birth_velocity_m_s=2, **o
     ),
     "joint1": lambda x, p, **o: auvest.SlatfJoint(x, p, particles=20, **o),
-    "joint2": lambda x, p, **o: auvest.SlatfJoint(x, p, particles=20, max_masters=2, kept=0, **o),
+    "joint2": lambda x, p, **o: auvest.SlatfJoint(
+        x, p, particles=20, max_masters=2, kept=0, gate=0, **o
+    ),
+    "shared": lambda x, p, **o: auvest.SlatfJoint(
+        x, p, particles=20, covariance="shared", max_masters=2, gate=0, **o
+    ),
     "ekf": lambda x, p, **o: auvest.EkfSlat(x, p, gate=16, **o),
     "ekf_imm": lambda x, p, **o: auvest.EkfSlat(x, p, master=auvest.Imm(), **o),
     "reckoning": lambda x, p, **o: auvest.DeadReckoning(x, p, **o),
@@ -287,7 +292,7 @@ def other_than(name: str) -> list[tuple[Any, str]]:
         others += [
             (auvest.Slatf(x, p, version=2, particles=37, gate=16, dtype="float32"), "version is 2"),
             (auvest.Slatf(x, p, version=1, particles=38, gate=16, dtype="float32"), "38, expected"),
-            (auvest.Slatf(x, p, version=1, particles=37, dtype="float32"), r"gate is 0\.0, expec"),
+            (auvest.Slatf(x, p, version=1, particles=37, dtype="float32"), r"gate is 13\.8, expec"),
             (
                 auvest.Slatf(
                     x, p, version=1, particles=37, gate=16, dtype="float32", master=auvest.Imm()

@@ -72,6 +72,7 @@
 #include "auvest/slat/outage.hpp"
 #include "auvest/slat/slatf.hpp"
 #include "auvest/slat/slatf_joint.hpp"
+#include "auvest/slat/slatf_shared.hpp"
 #include "auvest/vehicle/allocation.hpp"
 #include "auvest/vehicle/bluerov2_heavy.hpp"
 #include "auvest/vehicle/freedom.hpp"

@@ -18,16 +18,21 @@ enum class Status : std::uint8_t {
   kAlphaTooSmall,        ///< alpha cancels all digits of a model without closed-form deviations
   kOverflow,             ///< the result would not be finite
   kUnstableStep,         ///< the time step is longer than the hull's largest stable one
-  kSteepPitch            ///< pitch is beyond 80 degrees, where Euler angles fail
+  kSteepPitch,           ///< pitch is beyond 80 degrees, where Euler angles fail
+  kStepTooLong,          ///< dt is longer than the filter's longest_step_s: a clock that jumped?
+  kImpossibleRange,      ///< a range is negative or outside of what the sensor can measure
+  kFarFromOrigin,        ///< coordinates so large that the format is coarse against the sigmas
+  kRecoveriesRepeat      ///< the recovery has widened the belief too often: the model is wrong
 };
 
-/// One line of English for each status, without a full stop.
+/// One line of English for each status, without a full stop. Short: a chip holds all of them in
+/// RAM.
 inline const char* describe(Status status) {
   switch (status) {
     case Status::kOk:
       return "ok";
     case Status::kNotInitialised:
-      return "the filter has no belief yet; call reset(x0, P0) first";
+      return "no belief yet; call reset(x0, P0) first";
     case Status::kNotFinite:
       return "an argument is NaN or infinite";
     case Status::kTimeBackwards:
@@ -35,15 +40,23 @@ inline const char* describe(Status status) {
     case Status::kBadParameter:
       return "a parameter lies outside its stated range";
     case Status::kNotPositiveDefinite:
-      return "the covariance is not symmetric positive definite";
+      return "not symmetric positive definite";
     case Status::kAlphaTooSmall:
-      return "alpha is too small for a model without closed-form deviations in this precision";
+      return "alpha is too small here";
     case Status::kOverflow:
       return "the result would not be finite";
     case Status::kUnstableStep:
       return "the time step is unstable";
     case Status::kSteepPitch:
       return "pitch is beyond 80 degrees";
+    case Status::kStepTooLong:
+      return "dt exceeds longest_step_s";
+    case Status::kImpossibleRange:
+      return "an impossible range";
+    case Status::kFarFromOrigin:
+      return "too far from the origin";
+    case Status::kRecoveriesRepeat:
+      return "recoveries repeat";
   }
   return "unknown status";
 }

@@ -2,8 +2,8 @@
 
 The sketch runs on an Arduino at --port, or on a simulated one with --simulator, where the vehicle
 and its sonar are simulated too. --play-sonar simulates them for a board that has no sonar.
-Every sample is in the CSV file as soon as it has come, with all the bits of its floats; Ctrl-C
-ends a recording and keeps it.
+Every sample is in the CSV file as soon as it has come, with all the bits of its floats, until the
+end in a folder whose name ends in .unfinished; Ctrl-C ends a recording and keeps it.
 
 Examples
 --------
@@ -297,6 +297,7 @@ def command(
             finally:
                 recording.close()
     if not recording.rows:
+        recording.path.unlink(missing_ok=True)
         why = session.trouble or recording.last_damage or "interrupted"
         code = ExitCode.INTERRUPTED if session.interrupted else ExitCode.FAILED
         terminal.fail(f"no sample has come: {why}", code)

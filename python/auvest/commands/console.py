@@ -34,7 +34,10 @@ _being_made: list[NewFolder] = []
 def discard_unpublished() -> None:
     """Remove what a command has begun to write and not finished; the results before it stay."""
     while _being_made:
-        _being_made.pop().discard()
+        new = _being_made.pop()
+        new.discard()
+        if new.left is not None:
+            typer.echo(f"Note: what was recorded is in {shown(new.left)}", err=True)
 
 
 class Terminal:

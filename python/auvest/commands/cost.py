@@ -97,13 +97,14 @@ def command(
             file_okay=False,
         ),
     ] = None,
+    force: options.Force = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
     """Measure; the help text is the module's."""
     terminal = Terminal(as_json=as_json, quiet=quiet)
     with ExitStack() as stack:
-        new = terminal.new_folder(output, "cost") if output is not None else None
+        new = terminal.new_folder(output, "cost", force=force) if output is not None else None
         folder = new.part if new else Path(stack.enter_context(tempfile.TemporaryDirectory()))
         stack.enter_context(terminal.usage_errors())
         progress = stack.enter_context(terminal.progress("Compiling and running"))

@@ -30,6 +30,7 @@ from auvest._arguments import (
     as_real,
     as_step,
     as_steps,
+    far_from_origin,
     require_range,
 )
 from auvest._core import Decision, Status
@@ -54,6 +55,7 @@ Sensors: TypeAlias = MeasurementModel | Sequence[MeasurementModel] | Mapping[str
 _UPDATE = _core.robust_update_defaults()
 _FIXED = FixedInterval()
 _UNIT = Unit()
+_POSITION = ("x_m", "y_m", "z_m")
 _REPORT = ("innovation", "S", "standardised", "weight")
 _LARGEST_REPORT = 6  # numbers of a measurement
 _STATUSES = {int(status) for status in Status.__members__.values()}
@@ -85,6 +87,7 @@ class GaussianFilter:
         recovery: RejectionStreak | None = None,
         policy: IntervalPolicy | None = None,
         late_s: float = 0.0,
+        longest_step_s: float = 3600.0,
         residual: Residual = "innovation",
         max_iterations: int = _UPDATE["max_iterations"],
         tolerance: float = _UPDATE["tolerance"],
@@ -111,6 +114,9 @@ class GaussianFilter:
         self._policy = policy
         self._options: dict[str, Any] = {
             "late_s": as_number("late_s", late_s, "not negative"),
+            "longest_step_s": as_number(
+                "longest_step_s", longest_step_s, "positive", infinite=True
+            ),
             "residual": as_kind("residual", residual, ("innovation", "post-fit")),
             "max_iterations": as_integer("max_iterations", max_iterations, 2, 255),
             "tolerance": as_number("tolerance", tolerance, "not negative"),
@@ -122,10 +128,13 @@ class GaussianFilter:
         start = state[[0, min(1, states - 1)]]
         if reference is not None:
             start = as_array("reference", reference, (2,), self._dtype)
+        self._require_local(state, covariance)
         self._build()
         try:
             self._filter.reset(state, covariance, start)
         except _core.StatusError as error:
+            if error.status == Status.far_from_origin:
+                raise ValueError(far_from_origin("x0", state[:2], self._dtype)) from None
             if error.status != Status.not_positive_definite:
                 raise ValueError(f"x0 and P0 are refused: {error}") from None
             smallest = np.linalg.eigvalsh(covariance.astype(np.float64))[0]
@@ -133,6 +142,24 @@ class GaussianFilter:
                 f"P0 must be positive definite in {self._dtype.name}, "
                 f"but its smallest eigenvalue is {smallest:.3g}"
             ) from None
+
+    def _require_local(self, state: Floats, covariance: Floats) -> None:
+        """Refuse a start where motion is rounded away, however little is known of the position.
+
+        What counts is how far the process lets the position go in a second. (Functions of Python
+        are not asked: they are in float64, and may raise.)
+        """
+        if isinstance(self._process, FunctionProcess) or self._process.lacks:
+            return
+        before = np.asarray(covariance, np.float64)
+        phi = self._process.Phi(1.0, state)
+        growth = np.diagonal(phi @ before @ phi.T + self._process.Q(1.0) - before)
+        is_coarse = getattr(_core, f"is_coarse_{self._dtype.name}")
+        largest = float(np.finfo(self._dtype).max)
+        place = [i for i, name in enumerate(self._process.state) if name in _POSITION]
+        for i in place:
+            if growth[i] > 0 and is_coarse(float(state[i]), min(float(growth[i]), largest)):
+                raise ValueError(far_from_origin("x0", state[place], self._dtype))
 
     def _build(self) -> None:
         self._filter = self._core_filter(self._policy)
@@ -146,6 +173,8 @@ class GaussianFilter:
         """Make a filter of the core like this one, with the policy given."""
         name = self._dtype.name
         numbers = {**self._parameters, "late_s": self._options["late_s"]}
+        if self.longest_step_s < np.inf:
+            numbers["longest_step_s"] = self.longest_step_s
         require_range(numbers, name)
         options = {
             "linearisation": self._linearisation,
@@ -155,6 +184,7 @@ class GaussianFilter:
             "max_iterations": self._options["max_iterations"],
             "tolerance": self._options["tolerance"],
             "late_s": self._options["late_s"],
+            "longest_step_s": self._options["longest_step_s"],
         }
         try:
             return getattr(_core, f"Filter_{name}")(
@@ -212,7 +242,11 @@ class GaussianFilter:
 
     @property
     def status(self) -> Status:
-        """What the core reported last: ``Status.ok`` unless a FilterError was raised."""
+        """What the core reported last: ``Status.ok`` unless a FilterError was raised.
+
+        ``Status.recoveries_repeat`` while the recovery has widened the covariance so often that it
+        does not any more: then a model is wrong, and not the estimate.
+        """
         return self._filter.status
 
     @property
@@ -249,6 +283,11 @@ class GaussianFilter:
     def late_s(self) -> float:
         """How long ago a measurement may have been taken, s."""
         return float(self._options["late_s"])
+
+    @property
+    def longest_step_s(self) -> float:
+        """A longer prediction is refused, s; infinity: none is."""
+        return float(self._options["longest_step_s"])
 
     @property
     def policy(self) -> IntervalPolicy | None:
@@ -302,7 +341,7 @@ class GaussianFilter:
         Parameters
         ----------
         dt : float, optional
-            Seconds; default: the ``interval`` that the policy chose.
+            Seconds, at most ``longest_step_s``; default: the ``interval`` that the policy chose.
         input : array_like, shape (k,)
             What drove the process in that time, named by ``process.input``; not given for a process
             without input.
@@ -322,7 +361,7 @@ class GaussianFilter:
         if code == _core.UNCLEAR:
             step = None if dt is None else as_step(dt, self._dtype)
             code = self._filter.predict(step, self._as_input(input))
-        self._require_done(f"predict(dt={dt})", code)
+        self._require_done(f"predict(dt={dt})", code, dt=dt)
 
     def update(
         self,
@@ -374,7 +413,7 @@ class GaussianFilter:
                 hint=f"age_s = {age_s} is more than late_s = {self.late_s} or than the filter "
                 "has run",
             )
-        self._require_done("update", code)
+        self._require_done("update", code, z=z, sensor=sensor, place=place)
 
     def feedback(self, reference: npt.ArrayLike | None = None) -> float:
         """Choose the interval to the next sample, after the update; only with a policy.
@@ -423,7 +462,8 @@ class GaussianFilter:
             A measurement per row, those of smaller sensors filled up with NaN. NaN throughout: the
             measurement is missing and that row only predicts.
         dt : float or array_like, shape (T,)
-            Time from the row before (or the filter's present) to each row, s, not negative. With a
+            Time from the row before (or the filter's present) to each row, s, not negative and at
+            most ``longest_step_s``: a longer one ends the run with a FilterError at its row. With a
             policy the default is the intervals that it chooses; the record must then have been
             sampled at them.
         input : array_like, shape (T, k)
@@ -451,8 +491,10 @@ class GaussianFilter:
         ValueError, TypeError
             If an argument is wrong; the filter is unchanged.
         FilterError
-            If a row cannot be done. ``step`` names it, ``partial`` holds the results before it, and
-            the filter stays at the row before.
+            If a row cannot be done: ``dt`` beyond ``longest_step_s``, a range that the sensor
+            cannot measure, a place far from the origin, numbers that overflow. ``step`` names it,
+            ``partial`` holds the results before it, and the filter stays at the row before; a
+            further ``run`` may go on behind the row.
         Interrupted
             After Ctrl-C, a ``KeyboardInterrupt`` within half a second: ``partial`` holds the
             results so far, and the filter stays at their last row.
@@ -473,7 +515,7 @@ class GaussianFilter:
                 _require_rows("reference", track, count)
         elif reference is not None:
             raise TypeError("reference must be None: this filter has no interval policy")
-        record = {
+        record: dict[str, Any] = {
             "z": rows,
             "dt": np.full(count, np.nan, self._dtype)
             if dt is None
@@ -512,7 +554,15 @@ class GaussianFilter:
         }
         result = RunResult(**kept)
         if status != Status.ok:
-            error = FilterError("run", status, step=done, partial=result)
+            model = sensor if which is None else np.asarray(sensor)[done].item()
+            hint = self._why(
+                status,
+                dt=None if dt is None else record["dt"][done],
+                z=rows[done],
+                sensor=model,
+                place=None if record["place"] is None else record["place"][done],
+            )
+            error = FilterError("run", status, step=done, partial=result, hint=hint)
             try:
                 require_none_raised()
             except Exception as cause:
@@ -589,6 +639,9 @@ class GaussianFilter:
             raise ValueError("state is damaged: there is no such status")
         status = Status(int(arrays.pop("status")))
         self._require_interval(arrays["policy"])
+        states = len(self._process.state)
+        _require_correlations(arrays["P"], states)
+        _require_correlations(arrays["base"][states : states + states * states], states)
         events = self._remembered(arrays.pop("event_models"), arrays.pop("event_sensor"))
         report = _saved_report(arrays)
         twin = self._filter.copy()
@@ -831,11 +884,60 @@ class GaussianFilter:
             self._filter = before
             raise
 
-    def _require_done(self, action: str, code: int) -> None:
+    def _require_done(self, action: str, code: int, **given: Any) -> None:
         if code == 0:
             return
         require_none_raised()
-        raise FilterError(action, Status(code)) from None
+        raise FilterError(action, Status(code), hint=self._why(Status(code), **given)) from None
+
+    def _why(
+        self,
+        status: Status,
+        *,
+        dt: Any = None,
+        z: Any = None,
+        sensor: Any = None,
+        place: Any = None,
+    ) -> str:
+        """Explain a status that says less than is known here; empty for the others."""
+        if status == Status.step_too_long:
+            step = "the interval of the policy" if dt is None else f"dt = {float(dt):.6g} s"
+            return (
+                f"{step} is longer than longest_step_s = {self.longest_step_s:g} s: did the clock "
+                "jump, or is it in another unit?"
+            )
+        if status == Status.impossible_range:
+            name, model = self._named_sensor(sensor)
+            limits = ""
+            if hasattr(model, "smallest_range_m") and hasattr(model, "largest_range_m"):
+                limits = (
+                    f"; its ranges are {model.smallest_range_m:g} to {model.largest_range_m:g} m"
+                )
+            first = float(np.ravel(np.asarray(z))[0])
+            return (
+                f"{name} cannot measure a range of {first:g} m{limits}; NaN is for no measurement"
+            )
+        if status == Status.far_from_origin:
+            if place is None:
+                return far_from_origin("x", self.x[:2], self._dtype)
+            return far_from_origin("place", np.asarray(place), self._dtype)
+        return ""
+
+    def _named_sensor(self, sensor: str | MeasurementModel | None) -> tuple[str, MeasurementModel]:
+        if isinstance(sensor, MeasurementModel):
+            return type(sensor).__name__, sensor
+        name = next(iter(self._sensors)) if sensor is None else sensor
+        return name, self._sensors[name]
+
+
+def _require_correlations(saved: Floats, states: int) -> None:
+    """Refuse a covariance with a correlation beyond 1, whose elimination may leave the range."""
+    if saved.size != states * states:  # how many there are is the core's to say
+        return
+    covariance = saved.reshape(states, states).astype(np.float64)
+    sigma = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
+    if (np.abs(covariance) > 1.001 * np.outer(sigma, sigma)).any():
+        raise ValueError("state is damaged: its covariance has a correlation beyond 1")
 
 
 def _saved_report(arrays: dict[str, npt.NDArray[Any]]) -> dict[str, Any] | None:

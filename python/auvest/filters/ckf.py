@@ -13,7 +13,7 @@ class Ckf(GaussianFilter):
 
     Parameters
     ----------
-    x0, P0, process, sensors, kernel, recovery, policy, late_s, dtype
+    x0, P0, process, sensors, kernel, recovery, policy, late_s, longest_step_s, dtype
         As for :class:`auvest.Ekf`.
 
     Raises

@@ -13,6 +13,8 @@ class Ekf(GaussianFilter):
     ----------
     x0 : array_like, shape (n,)
         First estimate; n and the meaning of its components are those of ``process.state``.
+        Coordinates count from a local origin: where they are coarse in the precision against the
+        sigmas, as those of UTM in float32, they are refused.
     P0 : array_like, shape (n, n)
         Its covariance, symmetric positive definite.
     process : ProcessModel
@@ -29,6 +31,9 @@ class Ekf(GaussianFilter):
     late_s : float
         How long ago a measurement may have been taken, s: it goes in at its own time, and what came
         since is done again.
+    longest_step_s : float
+        A prediction longer than this, s, is refused: a clock that jumped, or another unit of time;
+        infinity: none is.
     residual : {"innovation", "post-fit"}
         What the kernel judges: the innovation by its own standard deviation, or what is left of it
         after the update by that of the sensor.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -10,7 +11,15 @@ import numpy as np
 import numpy.typing as npt
 
 from auvest import _core
-from auvest._arguments import DType, Floats, as_array, as_number, require_range
+from auvest._arguments import (
+    DType,
+    Floats,
+    as_array,
+    as_number,
+    far_from_origin,
+    require_range,
+)
+from auvest._core import Status
 from auvest._fields import Checked
 from auvest._state import describe
 
@@ -51,7 +60,8 @@ class Model(Checked):
         """Give the parameters in the core's order; refuse those that ``dtype`` cannot hold."""
         params = self._core_params()
         squared = tuple(name for name in params if name.startswith("sigma_"))
-        require_range(params, dtype, squared=squared if self._squares else ())
+        finite = {name: value for name, value in params.items() if not math.isinf(value)}
+        require_range(finite, dtype, squared=squared if self._squares else ())
         return np.array([params[name] for name in self._core_defaults()], dtype)
 
     #: Whether the sigmas are squared before they are used.
@@ -143,6 +153,14 @@ class ProcessModel(Model):
         return as_array("input", input, (len(self.input),), _FLOAT64).astype(np.float64)
 
 
+def require_range_limits(smallest_m: float, largest_m: float) -> None:
+    """Refuse a sensor that could measure no range."""
+    if not largest_m > smallest_m:
+        raise ValueError(
+            f"largest_range_m must be above smallest_range_m = {smallest_m}, not {largest_m}"
+        )
+
+
 class MeasurementModel(Model):
     """A measurement model: what a sensor would read in a state, and its noise.
 
@@ -187,7 +205,13 @@ class MeasurementModel(Model):
                     f"{self._how_for_more(states)}"
                 )
             make_sensor = getattr(_core, f"make_sensor_{dtype.name}")
-            sensor = make_sensor(self.core_name, states, self.values(dtype.name))
+            try:
+                sensor = make_sensor(self.core_name, states, self.values(dtype.name))
+            except _core.StatusError as error:
+                if error.status != Status.far_from_origin or self.place is None:
+                    raise
+                place = np.array(getattr(self, self.place))
+                raise ValueError(far_from_origin(self.place, place, dtype)) from None
             sensor.description = saved_as(self)
             return sensor
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from auvest import _core
-from auvest._fields import not_negative, pair, positive
-from auvest.models._base import MeasurementModel
+from auvest._fields import not_negative, number, pair, positive
+from auvest.models._base import MeasurementModel, require_range_limits
 
 _DEFAULTS = _core.sensor_defaults("LeaderRange")
 
@@ -18,12 +18,16 @@ class LeaderRange(MeasurementModel):
     Parameters
     ----------
     leader : (float, float)
-        Where the leader was when the range was taken, m.
+        Where the leader was when the range was taken, m from a local origin.
     sigma_range_m : float
         Standard deviation of the range, positive.
     sigma_leader_m : float
         Standard deviation of the leader's position per axis, not negative; adds to the noise of the
         range: ``R = sigma_range_m**2 + sigma_leader_m**2``.
+    smallest_range_m, largest_range_m : float
+        What the instrument can measure, m: a range outside is refused, for it is a code or a fault;
+        defaults: 0 and infinity. A smallest one below 0 is for readings whose noise is not cut off
+        at 0.
 
     Raises
     ------
@@ -37,6 +41,12 @@ class LeaderRange(MeasurementModel):
     leader: tuple[float, float] = pair((_DEFAULTS["leader_x_m"], _DEFAULTS["leader_y_m"]))
     sigma_range_m: float = positive(_DEFAULTS["sigma_range_m"])
     sigma_leader_m: float = not_negative(_DEFAULTS["sigma_leader_m"])
+    smallest_range_m: float = number(_DEFAULTS["smallest_range_m"])
+    largest_range_m: float = positive(_DEFAULTS["largest_range_m"], infinite=True)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require_range_limits(self.smallest_range_m, self.largest_range_m)
 
     def _core_params(self) -> dict[str, float]:
         params = super()._core_params()

@@ -8,8 +8,8 @@ import numpy as np
 
 from auvest import _core
 from auvest._arguments import as_array
-from auvest._fields import not_negative, positive
-from auvest.models._base import MeasurementModel
+from auvest._fields import not_negative, number, positive
+from auvest.models._base import MeasurementModel, require_range_limits
 
 _DEFAULTS = _core.sensor_defaults("RangeBearingElevation")
 
@@ -24,7 +24,7 @@ class RangeBearingElevation(MeasurementModel):
     Parameters
     ----------
     station : (float, float, float)
-        Position of the station, m.
+        Position of the station, m from a local origin.
     sigma_range_m, sigma_bearing_rad, sigma_elevation_rad : float
         Standard deviations of the three noises, positive. An instrument's error across the line of
         sight is an angle on the sphere: ``sigma_bearing_rad`` is that over the cosine of the
@@ -33,6 +33,10 @@ class RangeBearingElevation(MeasurementModel):
         Where the station, or the vertical through it, is nearer than this many standard deviations
         of the position, the measurement is taken as the position it points to. 0 switches this off
         except on them.
+    smallest_range_m, largest_range_m : float
+        What the instrument can measure, m: a range outside is refused, for it is a code or a fault;
+        defaults: 0 and infinity. A smallest one below 0 is for readings whose noise is not cut off
+        at 0.
 
     Raises
     ------
@@ -53,9 +57,12 @@ class RangeBearingElevation(MeasurementModel):
     sigma_bearing_rad: float = positive(_DEFAULTS["sigma_bearing_rad"])
     sigma_elevation_rad: float = positive(_DEFAULTS["sigma_elevation_rad"])
     near_field: float = not_negative(_DEFAULTS["near_field"])
+    smallest_range_m: float = number(_DEFAULTS["smallest_range_m"])
+    largest_range_m: float = positive(_DEFAULTS["largest_range_m"], infinite=True)
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        require_range_limits(self.smallest_range_m, self.largest_range_m)
         station = as_array("station", self.station, (3,), np.dtype(np.float64))
         object.__setattr__(self, "station", tuple(station.tolist()))
 

@@ -98,7 +98,10 @@ def innovations(
     shown = findings(residuals)
     if not causes or worst(one.verdict for one in found) != "sound":
         return shown
-    return [*diagnosis.diagnose(log, settings, filter_name, gross=bool(shown)), *shown]
+    named = diagnosis.diagnose(log, settings, filter_name, gross=bool(shown))
+    if named:  # it explains why one source has more of it than others
+        shown = [one for one in shown if one.cause != "source_off"]
+    return [*named, *shown]
 
 
 def check(path: Path, settings: Settings, filter_name: FilterName | None = None) -> Checked:

@@ -29,6 +29,7 @@ class FilterSettings:
     kind: FilterName | None = None  # None: robust-ekf for ranges, ukf for fixes
     kernel: KernelName = "hampel"  # with the thresholds that are its defaults
     alpha: float = positive(1e-3)
+    longest_step_s: float = positive(3600.0, infinite=True)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,22 +13,23 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-import numpy.typing as npt
 
+from auvest._arguments import Floats
 from auvest.errors import FilterError
 from auvest.logs import LogError, LogFolder
 from auvest.logs.changed import Change, ChangedLog, HeldLog, columns_changed
 from auvest.logs.findings import Finding, finding
-from auvest.logs.reader import Rows
+from auvest.logs.reader import CsvTable, Rows
 from auvest.replay.config import FilterName, Settings
 from auvest.replay.engine import Localiser, Replay, Tracker
 from auvest.replay.health import FEW, Residuals, numbers_measured
+from auvest.replay.sources import Sources
 from auvest.replay.tables import Columns
 
 #: So many lines of each file are looked at: a diagnosis of a day takes no longer than of an hour.
 LINES = 100_000
-#: Share of outliers that the likelihood allows for, and how many sigmas wide they are spread.
-OUTLIERS, OUTLIER_SIGMAS = 0.05, 100.0
+#: Share of outliers that the likelihood allows for, and over how many metres they are spread.
+OUTLIERS, OUTLIER_REACH_M = 0.05, 100.0
 #: A cause must make the innovations so much likelier: in all, and per measurement (nats).
 GAIN, GAIN_EACH = 12.0, 0.08
 #: Of two that explain the log within this share of the gain, and so many nats, both are named.
@@ -112,14 +113,14 @@ def diagnose(
     start = engine(log, settings, kind).start
     held = HeldLog(log, LINES, start if math.isfinite(start[0]) else None)
     run = _Refits(held, settings, kind)
-    as_is = run.residuals(Hypothesis("", {}, ""))
-    if as_is is None or len(as_is["nis"]) < FEW:
+    as_is = run.run(Hypothesis("", {}, ""))
+    if as_is is None or len(as_is.rows["nis"]) < FEW:
         return []
-    count = len(as_is["nis"])
-    base = float(np.sum(log_likelihoods(as_is)))
+    count = len(as_is.rows["nis"])
+    base = float(np.sum(log_likelihoods(as_is.rows)))
     fits = [
         fit
-        for family in _families(held, as_is, gross=gross)
+        for family in _families(held, as_is.rows, gross=gross)
         for fit in run.best(family, base, count)
     ]
     if not fits:
@@ -142,7 +143,7 @@ def diagnose(
     return list(found.values())
 
 
-def log_likelihoods(rows: Columns) -> npt.NDArray[np.float64]:
+def log_likelihoods(rows: Columns) -> Floats:
     """Logarithm of the likelihood of each measurement, given those before it.
 
     A measurement is an outlier with a small probability, and then anywhere within a wide reach;
@@ -151,13 +152,25 @@ def log_likelihoods(rows: Columns) -> npt.NDArray[np.float64]:
     numbers = numbers_measured(rows)
     sigma = rows["sigma_0"]
     inlier = -0.5 * rows["nis"] - np.log(sigma) - 0.5 * numbers * math.log(2 * math.pi)
-    reach = math.log(OUTLIER_SIGMAS) * np.ones(len(sigma))
+    reach = math.log(OUTLIER_REACH_M) * np.ones(len(sigma))
     if numbers == 2:
         near = rows["near_field"] != 0  # there both numbers are metres
         inlier -= np.log(rows["sigma_1"])
         inlier[near] += np.log(np.maximum(rows["range_m"][near], 1e-3))
         reach += math.log(2 * math.pi)
+    return _with_outliers(inlier, reach)
+
+
+def _with_outliers(inlier: Floats, reach: Floats | float) -> Floats:
     return np.logaddexp(math.log(1 - OUTLIERS) + inlier, math.log(OUTLIERS) - reach)
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a refit left: innovations, and the track (time, x, y)."""
+
+    rows: Columns
+    track: Rows
 
 
 class _Refits:
@@ -168,16 +181,18 @@ class _Refits:
         self._settings = settings
         self._kind = kind
 
-    def residuals(self, one: Hypothesis) -> Columns | None:
-        """Give what the measurements leave under a hypothesis; None if it cannot be run."""
-        residuals = Residuals()
+    def run(self, one: Hypothesis) -> Run | None:
+        """Run it; None if it cannot be run."""
+        residuals, track = Residuals(), [np.empty((0, 3))]
         log = ChangedLog(self._log, one.changes)
         try:
             for batch in engine(log, one.settings(self._settings), self._kind).batches():
                 residuals.add(batch)
+                columns = [batch.estimates[name] for name in ("time_s", "x_m", "y_m")]
+                track.append(np.column_stack(columns))
         except (LogError, FilterError):
             return None
-        return residuals.rows()
+        return Run(residuals.rows(), np.concatenate(track))
 
     def best(self, family: list[Hypothesis] | Number, base: float, count: int) -> list[Fit]:
         """Give the likeliest of a family, in a list; none if the family is empty."""
@@ -199,15 +214,58 @@ class _Refits:
         return [max(tried.values(), key=_likelihood)]
 
     def _fit(self, one: Hypothesis, count: int) -> Fit:
-        rows = self.residuals(one)
-        if rows is None or len(rows["nis"]) == 0:
+        run = self.run(one)
+        if run is None or len(run.rows["nis"]) == 0:
             return Fit(one, -math.inf)
-        each = log_likelihoods(rows)
-        if one.source is not None:  # what is left out counts as outliers
-            floor = math.log(OUTLIERS) - math.log(OUTLIER_SIGMAS)
-            floor -= math.log(2 * math.pi) if numbers_measured(rows) == 2 else 0.0
-            return Fit(one, float(each.sum()) + floor * (count - len(each)))
-        return Fit(one, float(each.mean()) * count)
+        each = log_likelihoods(run.rows)
+        if one.source is None:
+            return Fit(one, float(each.mean()) * count)
+        # What was left out is judged by its own offset and spread from the track of the others.
+        apart, off_m, spread_m = self._apart(run, one.source)
+        told = replace(one, message=one.message.format(off=off_m, spread=spread_m))
+        left = max(count - len(each), 0)
+        return Fit(told, float(each.sum()) + left * (float(apart.mean()) if len(apart) else 0.0))
+
+    def _apart(self, run: Run, source: int) -> tuple[Floats, float, float]:
+        """Likelihoods of a source's measurements given the track that the others gave.
+
+        Each number that it measures has an offset and a spread of its own: the median and the
+        median absolute deviation of its differences from the track; those of range are returned.
+        """
+        table = self._log["fixes.csv" if self._log.tracking else "ranges.csv"]
+        measured = _rows(table)
+        measured = measured[measured[:, 1] == source]
+        places = _sources(self._log, self._settings).locate(measured[:, 0], measured[:, 1])
+        inside = ~np.isnan(places[:, 0])
+        inside &= (measured[:, 0] >= run.track[0, 0]) & (measured[:, 0] <= run.track[-1, 0])
+        measured, places = measured[inside], places[inside]
+        if len(measured) == 0:
+            return np.empty(0), math.nan, math.nan
+        at = [np.interp(measured[:, 0], run.track[:, 0], run.track[:, k]) for k in (1, 2)]
+        away = (at[0] - places[:, 0]) + 1j * (at[1] - places[:, 1])
+        numbers = [measured[:, 2] - np.abs(away)]
+        least = [self._settings.ranges.sigma_m]
+        if self._log.tracking:
+            numbers.append(np.angle(np.exp(1j * measured[:, 3]) / np.exp(1j * np.angle(away))))
+            fixes = self._settings.fixes
+            least = [fixes.sigma_range_m, fixes.sigma_bearing_rad]
+        inlier = np.zeros(len(measured))
+        found = []
+        for off, sigma in zip(numbers, least, strict=True):
+            median = float(np.median(off))
+            spread = max(1.4826 * float(np.median(np.abs(off - median))), sigma)
+            inlier += -0.5 * ((off - median) / spread) ** 2 - math.log(spread)
+            inlier -= 0.5 * math.log(2 * math.pi)
+            found.append((median, spread))
+        reach = math.log(OUTLIER_REACH_M) + (len(numbers) - 1) * math.log(2 * math.pi)
+        return _with_outliers(inlier, reach), *found[0]
+
+
+def _sources(log: LogFolder, settings: Settings) -> Sources:
+    sources = Sources(log.beacons(), settings.log.leader_gap_s)
+    if "leaders.csv" in log:
+        sources.add(_rows(log["leaders.csv"]))
+    return sources
 
 
 def _likelihood(fit: Fit) -> float:
@@ -255,7 +313,8 @@ def _families(log: LogFolder, rows: Columns, *, gross: bool) -> Iterator[list[Hy
             Hypothesis(
                 "source_off",
                 {measured: _without(source)},
-                f"source {source} does not fit, and without it the others do",
+                f"source {source}: its ranges are {{off:+.3g}} m off the track that the others "
+                "give, with a spread of {spread:.2g} m",
                 source=source,
             )
             for source in sources
@@ -368,3 +427,8 @@ def _turned(sign: float, angle: float, rows: Rows) -> Rows:
 
 def _without(source: int) -> Change:
     return lambda rows: rows[rows[:, 1] != source]
+
+
+def _rows(table: CsvTable) -> Rows:
+    parts = [np.empty((0, len(table.columns)))]
+    return np.concatenate(parts + [rows for rows, _ in table.chunks()])

@@ -516,6 +516,7 @@ def _build(
     """Make the filter of this name, with what the settings say of its kind."""
     entry = registry.filter_named(name, registry.replayable())
     kind: type[GaussianFilter] = getattr(auvest, entry.cls)
+    models["longest_step_s"] = settings.filter.longest_step_s
     if issubclass(kind, (RobustEkf, RobustUkf)):
         models["kernel"] = settings.filter.kernel
     if issubclass(kind, Ukf):

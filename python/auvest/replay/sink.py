@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 import pyarrow as pa
@@ -21,12 +21,18 @@ class _Sink:
 
     def __init__(self) -> None:
         self._writers: list[Any] = []
+        self._files: list[BinaryIO] = []
+
+    def _open(self, path: Path) -> BinaryIO:
+        # Arrow takes no name that is not UTF-8, but any file.
+        self._files.append(path.open("wb"))
+        return self._files[-1]
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        for writer in self._writers:
+        for writer in (*self._writers, *self._files):
             writer.close()
 
 
@@ -45,8 +51,8 @@ class TableFiles(_Sink):
         table = pa.table(dict(columns))
         if not self._writers:
             self._writers = [
-                pa_csv.CSVWriter(self.paths[0], table.schema),
-                pa_parquet.ParquetWriter(self.paths[1], table.schema),
+                pa_csv.CSVWriter(self._open(self.paths[0]), table.schema),
+                pa_parquet.ParquetWriter(self._open(self.paths[1]), table.schema),
             ]
         for writer in self._writers if len(table) else ():
             writer.write_table(table)
@@ -77,6 +83,7 @@ class TumFile(_Sink):
         )
         if not self._writers:
             options = pa_csv.WriteOptions(include_header=False, delimiter=" ")
-            self._writers = [pa_csv.CSVWriter(self.path, table.schema, write_options=options)]
+            file = self._open(self.path)
+            self._writers = [pa_csv.CSVWriter(file, table.schema, write_options=options)]
         if len(table):
             self._writers[0].write_table(table)

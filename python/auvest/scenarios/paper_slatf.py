@@ -105,6 +105,10 @@ def paper_filter(
     if name in ("dr", "dr_compensated"):
         return DeadReckoning(x0, P0, motion=motion, dtype=dtype)
     master = PiecewiseAcceleration(acceleration_m_s2=acceleration_m_s2)
+    # The paper has no gate, and no more in its covariance than the particles say.
+    options = {"gate": 0.0, **options}
+    if name in ("slatf1", "slatf2"):
+        options.setdefault("monte_carlo", False)
     options.update(motion=motion, master=master, sonar=scenario.sonar, dtype=dtype)
     if name == "ekf_slat":
         return EkfSlat(x0, P0, **options)

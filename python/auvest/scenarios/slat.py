@@ -97,6 +97,10 @@ class SlatScenario(Checked):
         Probability that an echo is lost.
     outlier, outlier_sigmas : float
         Probability that an echo is wrong, and by how many standard deviations.
+    doubled : float
+        Probability that echoes have twice the range: a multipath.
+    doubled_in_a_row : int
+        So many in a row then.
     silent_from_s, silent_to_s : float
         No echo in between.
     identified : bool
@@ -124,6 +128,8 @@ class SlatScenario(Checked):
     dropout: float = fraction(_PARAMS["dropout"])
     outlier: float = fraction(_PARAMS["outlier"])
     outlier_sigmas: float = not_negative(_PARAMS["outlier_sigmas"])
+    doubled: float = fraction(_PARAMS["doubled"])
+    doubled_in_a_row: int = integer(_PARAMS["doubled_in_a_row"], 1, 10**6)
     silent_from_s: float = not_negative(_PARAMS["silent_from_s"])
     silent_to_s: float = not_negative(_PARAMS["silent_to_s"])
     identified: bool = flag(_PARAMS["identified"])
@@ -197,6 +203,8 @@ class SlatResult(Runs):
         Of :class:`auvest.EkfSlat`; 0 for the others.
     resamplings, heard : ndarray of int, shape (runs,)
         Resamplings, and echoes taken in.
+    refused, rebirths : ndarray of int, shape (runs,)
+        Echoes refused by the gate, and masters born again.
     log_likelihood : ndarray, shape (runs,)
         Of all echoes of the run.
     status : ndarray of uint8, shape (runs,)
@@ -215,6 +223,8 @@ class SlatResult(Runs):
     nis: Floats
     resamplings: npt.NDArray[np.int64]
     heard: npt.NDArray[np.int64]
+    refused: npt.NDArray[np.int64]
+    rebirths: npt.NDArray[np.int64]
     log_likelihood: Floats
     status: npt.NDArray[np.uint8]
     scenario: SlatScenario
@@ -310,7 +320,7 @@ def simulate(
     world = scenario._as_core()
     core = filter._core_steps.copy()
     sonar = core_sonar(filter.sonar, filter.dtype.name)
-    still = _core.Slat_compass_float64.dead_reckoning({}).simulate(
+    still = _core.Slat_compass_float64.dead_reckoning({}, math.inf).simulate(
         core_sonar(Sonar(), "float64"), world, 0, 0, 1
     )
     true = {name: still[name] for name in ("time_s", "truth", "masters")}

@@ -13,9 +13,16 @@ from auvest.slat._base import (
 )
 from auvest.slat.dead_reckoning import DeadReckoning
 from auvest.slat.ekf_slat import MAX_IMM_MASTERS, EkfSlat
+from auvest.slat.models import no_harm
 from auvest.slat.outage import Outage
 from auvest.slat.results import SlatRun
-from auvest.slat.slatf import MAX_PARTICLES, Lanes, Slatf, available_lanes
+from auvest.slat.slatf import (
+    MAX_PARTICLES,
+    Lanes,
+    OverconfidenceWarning,
+    Slatf,
+    available_lanes,
+)
 from auvest.slat.slatf_joint import SlatfJoint
 
 __all__ = [
@@ -27,6 +34,7 @@ __all__ = [
     "EkfSlat",
     "Lanes",
     "Outage",
+    "OverconfidenceWarning",
     "ParticleSlatFilter",
     "Resampling",
     "SlatFilter",
@@ -34,4 +42,5 @@ __all__ = [
     "Slatf",
     "SlatfJoint",
     "available_lanes",
+    "no_harm",
 ]

@@ -6,6 +6,7 @@ where they are plain; what it does not take is converted here, or refused with w
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Literal, TypeVar, get_args
 
@@ -14,6 +15,7 @@ import numpy.typing as npt
 
 from auvest import _core, _state
 from auvest._arguments import (
+    Bound,
     DType,
     Exclusive,
     Floats,
@@ -54,6 +56,19 @@ COMPASS = CompassMotion()
 MASTER = PiecewiseAcceleration()
 SONAR = Sonar()
 
+_NEEDS_KNOWN = (
+    "master is UNKNOWN_MASTER, but particles that differ in whose echo it was cannot share one "
+    "covariance: take SlatfJoint(covariance='particle')"
+)
+
+#: Parameters that must not be 0.
+_POSITIVE = (
+    "fastest_m_s",
+    "rebirth_velocity_m_s",
+    "rebirth_acceleration_m_s2",
+    "longest_step_s",
+)
+
 Resampling = Literal["systematic", "stratified", "residual", "multinomial"]
 
 _Self = TypeVar("_Self", bound="Steps")
@@ -72,6 +87,7 @@ class Steps:
     _exclusive: Exclusive
     _deaf: bool = False  # hears no echo, so that it does not matter whose it is
     _births: bool = False  # an echo of which nothing is said is of nobody knows whom
+    _shared: bool = False  # one covariance for all particles: every echo must be somebody's
 
     @property
     def x(self) -> Floats:
@@ -100,6 +116,22 @@ class Steps:
     def status(self) -> Status:
         """What the core reported last: ``Status.ok`` unless a FilterError was raised."""
         return self._status
+
+    @property
+    def refused(self) -> int:
+        """Echoes since the start that particles with more than half of the weight refused."""
+        return int(self._reading("refused"))
+
+    @property
+    def rebirths(self) -> int:
+        """Masters born again since the start: lost behind the gate, or silent for too long."""
+        return int(self._reading("rebirths"))
+
+    @property
+    def since_rebirth_s(self) -> float:
+        """Seconds since the last rebirth; infinite if there was none."""
+        seconds = float(self._reading("since_rebirth_s"))
+        return seconds if seconds >= 0 else math.inf
 
     @property
     def dtype(self) -> DType:
@@ -268,6 +300,8 @@ class Steps:
                 resamplings=out["resamplings"][:done],
                 log_likelihood=out["log_likelihood"][:done],
                 nis=out["nis"][:done],
+                refused=out["refused"][:done],
+                rebirths=out["rebirths"][:done],
             )
             self._status = status
         if self._status != Status.ok:
@@ -396,6 +430,10 @@ class Steps:
     def _slave(self) -> tuple[Floats, Floats]:
         return self._core_steps.slave()
 
+    def _reading(self, name: str) -> Any:
+        with self._exclusive:
+            return getattr(self._core_steps, name)
+
     def _do(
         self, name: str, plain: tuple[Any, ...], convert: Callable[[], tuple[Any, ...]], *rest: Any
     ) -> None:
@@ -407,6 +445,8 @@ class Steps:
                     raise AssertionError(f"{name}: converted arguments are plain")
             except _core.StatusError as error:
                 self._status = error.status
+                if self._shared and error.status == Status.bad_parameter:
+                    raise ValueError(_NEEDS_KNOWN) from None
                 action = name if name == "update" else f"{name}(dt={plain[0]})"
                 raise FilterError(action, error.status) from None
             self._status = Status.ok
@@ -456,7 +496,8 @@ class Steps:
         if master is None:
             if masters > 1 and not self._unknown:
                 raise TypeError(f"master must be given: the filter has {masters} masters")
-            return np.full(count, UNKNOWN_MASTER if self._unknown else 0, np.int64)
+            nobody = self._unknown or masters == 0  # then the core has the word
+            return np.full(count, UNKNOWN_MASTER if nobody else 0, np.int64)
         raw = np.asarray(master)
         if raw.dtype.kind not in "iu":
             raise TypeError(f"master must be an int or an array of int, not of {raw.dtype.name}")
@@ -466,6 +507,8 @@ class Steps:
         for number in np.unique(numbers):
             if not UNKNOWN_MASTER <= number < masters:
                 raise ValueError(f"master is {number}, but the filter has {masters} masters")
+            if self._shared and number == UNKNOWN_MASTER:
+                raise ValueError(_NEEDS_KNOWN)
         return numbers
 
 
@@ -478,7 +521,7 @@ class SlatFilter(Steps):
     """
 
     #: The parameters in the core, with their defaults.
-    _defaults: ClassVar[Mapping[str, Any]] = {}
+    _defaults: Mapping[str, Any] = {}
 
     _max_masters: int = MAX_MASTERS
     _settings: dict[str, Any]  # beside motion, sonar and dtype: all that makes the filter
@@ -522,7 +565,8 @@ class SlatFilter(Steps):
         self._exclusive = Exclusive()
         self._device = core_sonar(self._sonar, name)
         params = {key: self._settings[key] for key in self._defaults}
-        require_range(params, name)
+        finite = {key: value for key, value in params.items() if value != math.inf}
+        require_range(finite, name)
         core = getattr(_core, f"Slat_{self._motion.name}_{name}")
         self._core_steps = self._build(core, core_params(self._motion, name), params)
 
@@ -553,10 +597,6 @@ class SlatFilter(Steps):
         if modes.size == 0:
             raise ValueError("mode probabilities need an auvest.Imm as master")
         return modes
-
-    def _reading(self, name: str) -> Any:
-        with self._exclusive:
-            return getattr(self._core_steps, name)
 
     @property
     def masters(self) -> int:
@@ -634,9 +674,18 @@ class SlatFilter(Steps):
             if isinstance(self._defaults[name], bool):
                 params[name] = as_flag(name, value)
                 continue
-            params[name] = as_number(name, value, "not negative")
+            if isinstance(self._defaults[name], int):
+                params[name] = as_integer(name, value, 0, 16)
+                continue
+            bound: Bound = "positive" if name in _POSITIVE else "not negative"
+            params[name] = as_number(name, value, bound, infinite=name == "longest_step_s")
             if name in ("resample_below", "kept") and params[name] > 1:
                 raise ValueError(f"{name} must lie in 0..1, not {params[name]:g}")
+        if params.get("recover_after", 0) > params.get("recover_of", 0):
+            raise ValueError(
+                f"recover_after = {params['recover_after']} of the last "
+                f"recover_of = {params['recover_of']} echoes cannot be"
+            )
         return params
 
 

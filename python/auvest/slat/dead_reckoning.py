@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from types import MappingProxyType
 from typing import Any
 
 import numpy.typing as npt
 
+from auvest import _core
 from auvest.slat._base import COMPASS, SlatFilter
 from auvest.slat.models import Motion
 
@@ -17,6 +19,8 @@ class DeadReckoning(SlatFilter):
     ----------
     x0, P0, motion, dtype
         As for :class:`Slatf`. ``CompassMotion(compensate_bias=False)`` is the paper's.
+    longest_step_s : float
+        A longer prediction is refused; infinite: none is.
 
     Raises
     ------
@@ -25,6 +29,7 @@ class DeadReckoning(SlatFilter):
     """
 
     _deaf = True
+    _defaults = MappingProxyType({"longest_step_s": _core.ekf_slat_defaults()["longest_step_s"]})
 
     def __init__(
         self,
@@ -33,9 +38,9 @@ class DeadReckoning(SlatFilter):
         *,
         motion: Motion = COMPASS,
         dtype: npt.DTypeLike = "float64",
+        **options: Any,
     ) -> None:
-        super().__init__(x0, P0, motion=motion, dtype=dtype)
+        super().__init__(x0, P0, motion=motion, dtype=dtype, **options)
 
     def _build(self, core: Any, motion: dict[str, Any], params: dict[str, Any]) -> Any:
-        del params
-        return core.dead_reckoning(motion)
+        return core.dead_reckoning(motion, params["longest_step_s"])

@@ -14,8 +14,6 @@ from auvest.slat.models import Imm, Master, Motion, PiecewiseAcceleration, Sonar
 #: Masters that :class:`EkfSlat` can track with an :class:`~auvest.Imm`.
 MAX_IMM_MASTERS = _core.slat_max_imm_masters
 
-_DEFAULTS = _core.ekf_slat_defaults()
-
 
 class EkfSlat(SlatFilter):
     """Slave and masters in one extended Kalman filter: the yardstick for the particle filters.
@@ -24,8 +22,12 @@ class EkfSlat(SlatFilter):
     ----------
     x0, P0, motion, master, sonar, dtype
         As for :class:`Slatf`.
-    gate : float
-        An echo whose NIS (2 degrees of freedom) exceeds this says nothing; 0: no gate.
+    gate, recover_after, recover_of, fastest_m_s, forget_after_s, rebirth_velocity_m_s, \
+rebirth_acceleration_m_s2, longest_step_s
+        As for :class:`Slatf`.
+    consider : bool
+        The slave is considered, not estimated (Schmidt-Kalman): echoes tell of the masters, with
+        all that is not known of the slave, and never correct it.
 
     Raises
     ------
@@ -33,7 +35,7 @@ class EkfSlat(SlatFilter):
         If an argument is wrong; the message names it.
     """
 
-    _defaults = _DEFAULTS
+    _defaults = _core.ekf_slat_defaults()
 
     def __init__(
         self,
@@ -43,14 +45,14 @@ class EkfSlat(SlatFilter):
         motion: Motion = COMPASS,
         master: Master = MASTER,
         sonar: Sonar = SONAR,
-        gate: float = _DEFAULTS["gate"],
         dtype: npt.DTypeLike = "float64",
+        **options: Any,
     ) -> None:
         as_instance("master", master, (PiecewiseAcceleration, Imm))
         self._max_masters = MAX_IMM_MASTERS if isinstance(master, Imm) else MAX_MASTERS
         settings = {"master": master}
         super().__init__(
-            x0, P0, motion=motion, sonar=sonar, dtype=dtype, settings=settings, gate=gate
+            x0, P0, motion=motion, sonar=sonar, dtype=dtype, settings=settings, **options
         )
 
     def _build(self, core: Any, motion: dict[str, Any], params: dict[str, Any]) -> Any:

@@ -88,6 +88,9 @@ class PiecewiseAcceleration(Checked):
     ----------
     acceleration_m_s2 : float
         q, standard deviation of the jump of each prediction, m/s^2, not negative.
+    position_psd : float
+        Power spectral density of a random walk of the position, m^2/s, not negative; the paper has
+        none. See :func:`no_harm`.
 
     Raises
     ------
@@ -96,6 +99,7 @@ class PiecewiseAcceleration(Checked):
     """
 
     acceleration_m_s2: float = not_negative(_MASTER["acceleration_m_s2"])
+    position_psd: float = not_negative(_MASTER["position_psd"])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -220,6 +224,36 @@ class Sonar(Checked):
             value = getattr(self, name)
             if value <= 1e-6:
                 raise ValueError(f"{name} must be above 1e-6, not {value}")
+
+
+def no_harm(*, position_psd: float = 0.1, forget_after_s: float = 2.0) -> dict[str, Any]:
+    """Make options of a filter that does no harm to the slave where no master's plan is known.
+
+    A master is a slow random walk without a velocity, and is born again after a silence: what it
+    did meanwhile is not charged to the slave. On real robots the slave is then as good as by dead
+    reckoning or a little better, at gaps for which other models double its error
+    (docs/reproduction/mrclam6). Give the masters that you add a velocity and an acceleration of
+    zero with the standard deviations ``rebirth_velocity_m_s`` and ``rebirth_acceleration_m_s2``
+    that stand in the result.
+
+    Parameters
+    ----------
+    position_psd : float
+        Of the random walk, m^2/s on each axis. 0.1 for masters that move at 0.03 to 0.08 m/s.
+    forget_after_s : float
+        The 95 % point of the intervals between sightings is a good choice.
+
+    Returns
+    -------
+    dict
+        Keyword arguments of :class:`EkfSlat`, :class:`SlatfJoint` and :class:`Slatf`.
+    """
+    return {
+        "master": PiecewiseAcceleration(acceleration_m_s2=0, position_psd=position_psd),
+        "forget_after_s": forget_after_s,
+        "rebirth_velocity_m_s": 1e-3,
+        "rebirth_acceleration_m_s2": 1e-3,
+    }
 
 
 def core_master(master: Master, dtype: str) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from auvest import _core
 from auvest._arguments import Exclusive, Floats, as_array, as_instance
 from auvest._core import Status
 from auvest.errors import FilterError
-from auvest.slat._base import MAX_MASTERS, SlatFilter, Steps, as_covariance
+from auvest.slat._base import SlatFilter, Steps, as_covariance
 from auvest.slat.dead_reckoning import DeadReckoning
 from auvest.slat.ekf_slat import EkfSlat
 from auvest.slat.slatf import Slatf
@@ -42,7 +42,7 @@ class Outage(Steps):
         as_instance("filter", filter, (Slatf, SlatfJoint, EkfSlat, DeadReckoning))
         self._filter = copy.deepcopy(filter)
         self._dtype, self._motion, self._sonar = filter.dtype, filter.motion, filter.sonar
-        self._deaf, self._births = filter._deaf, filter._births
+        self._deaf, self._births, self._shared = filter._deaf, filter._births, filter._shared
         self._random = self._filter._random.copy()
         self._status = Status.ok
         self._prepare()
@@ -85,10 +85,9 @@ class Outage(Steps):
         n = self._motion.pose_states
         state = as_array("x", x, (n,), self._dtype)
         covariance = as_covariance("P", P, n, self._dtype, definite=False)
-        if len(masters) > MAX_MASTERS:
-            raise ValueError(
-                f"masters has {len(masters)} elements, at most {MAX_MASTERS} are taken"
-            )
+        most = self._filter._max_masters
+        if len(masters) > most:
+            raise ValueError(f"masters has {len(masters)} elements, at most {most} are taken")
         states = np.empty((len(masters), 6), self._dtype)
         covariances = np.empty((len(masters), 6, 6), self._dtype)
         for k, (one_x, one_p) in enumerate(masters):

@@ -35,6 +35,8 @@ class SlatRun(Result):
         Logarithm of the density of all echoes since the start of the filter.
     nis : ndarray, shape (T,)
         Of the last update of :class:`EkfSlat`, 2 degrees of freedom per echo; 0 for the others.
+    refused, rebirths : ndarray of int, shape (T,)
+        Echoes refused by the gate, and masters born again, since the start of the filter.
     """
 
     time_s: Floats
@@ -46,3 +48,5 @@ class SlatRun(Result):
     resamplings: npt.NDArray[np.int64]
     log_likelihood: Floats
     nis: Floats
+    refused: npt.NDArray[np.int64]
+    rebirths: npt.NDArray[np.int64]

@@ -14,12 +14,20 @@ from auvest._arguments import DType, as_dtype, as_integer, as_kind, as_number
 from auvest._build import lacks
 from auvest.slat._base import MASTER, ParticleSlatFilter
 from auvest.slat.models import Imm, Master, PiecewiseAcceleration, core_master
+from auvest.slat.results import SlatRun
 
 for _line in lacks():
     warnings.warn(f"auvest was {_line}", RuntimeWarning, stacklevel=2)
 
 #: Particles that a filter takes at most: 0.5 kB each in float32.
 MAX_PARTICLES = 10_000_000
+#: Resamplings, as a share of N, beyond which the covariance is called too small.
+OVERCONFIDENT_SHARE = 0.3
+
+
+class OverconfidenceWarning(UserWarning):
+    """A filter claims to know more than it can."""
+
 
 Lanes = Literal["scalar", "sse2", "avx2", "avx512"]
 
@@ -34,6 +42,11 @@ def available_lanes(dtype: npt.DTypeLike = "float32") -> tuple[str, ...]:
 
 class Slatf(ParticleSlatFilter):
     """SLATF 1.0 and 2.0: a particle filter over the slave's pose with an EKF per master in each.
+
+    The paper's filter. Its covariance is too small: at N = 100 the truth lies in its 95 % ellipse
+    two times in three, and less often the longer it runs, because the drift that slave and masters
+    share is held by points alone, which die out as particles are resampled. Take
+    :class:`SlatfJoint` with ``covariance="shared"`` where the covariance matters.
 
     Parameters
     ----------
@@ -54,8 +67,26 @@ class Slatf(ParticleSlatFilter):
     carry_covariance : bool
         2.0 only: Eq. (50) to the letter, see docs/algorithms/slatf.md.
     gate : float
-        An echo whose NIS (2 degrees of freedom) exceeds this in a particle says nothing to it;
-        0: no gate, as in the paper. 16 loses one good echo in 3,000.
+        An echo whose NIS (2 degrees of freedom) exceeds this in a particle says nothing to it.
+        The default, 13.8, loses one good echo in 1,000; 0: no gate and no recovery, as in the
+        paper.
+    recover_after, recover_of : int
+        A master of whose last ``recover_of`` echoes (at most 16) ``recover_after`` were refused, at
+        places where one vehicle can have been, is born again at the last of them. Must exceed the
+        longest burst of wrong echoes that agree with each other. 0: never.
+    fastest_m_s : float
+        No master moves faster between two echoes.
+    forget_after_s : float
+        An echo that ends a longer silence of its master is its rebirth; 0: never. What a master
+        did in the silence is else charged to the slave: for masters whose plan is not known.
+    rebirth_velocity_m_s, rebirth_acceleration_m_s2 : float
+        Standard deviations of a master that is born again, about zero.
+    longest_step_s : float
+        A longer prediction is refused with ``Status.step_too_long``: it is a wrong time stamp.
+        Infinite: none is.
+    monte_carlo : bool
+        The slave's covariance includes the error that resampling has left in its mean, as far as N
+        tells it; False: as in the paper.
     birth_velocity_m_s, birth_acceleration_m_s2 : float
         Standard deviations of a master that is born from an unknown echo, see the algorithm's
         page; velocity 0: no births. Needs a gate.
@@ -116,6 +147,29 @@ class Slatf(ParticleSlatFilter):
             settings["particles"],
             self._lanes,
         )
+
+    @property
+    def overconfident(self) -> bool:
+        """More was resampled than N particles bear: the covariance is far too small by now."""
+        return self.resamplings > OVERCONFIDENT_SHARE * self.particles
+
+    def __repr__(self) -> str:
+        if not self.overconfident:
+            return super().__repr__()
+        many = f"resamplings={self.resamplings}: its covariance is too small"
+        return f"{super().__repr__()[:-1]}, {many})"
+
+    def run(self, *args: Any, **options: Any) -> SlatRun:
+        """See :meth:`SlatFilter.run`; warns where :attr:`overconfident`."""
+        result = super().run(*args, **options)
+        if self.overconfident:
+            warnings.warn(
+                f"{self.resamplings} resamplings of {self.particles} particles: the covariance is "
+                "too small. Take SlatfJoint(covariance='shared'), or more particles",
+                OverconfidenceWarning,
+                stacklevel=2,
+            )
+        return result
 
     @property
     def version(self) -> int:

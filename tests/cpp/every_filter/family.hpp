@@ -81,6 +81,7 @@ class Filter {
   virtual Status check() const = 0;
   virtual bool initialised() const = 0;
   virtual Status reset(const Numbers& x0, const Numbers& P0) = 0;
+  virtual Status limit_steps(double longest_step_s) = 0;
   virtual Status predict(double dt, const Numbers& input) = 0;
   /// `age` is for filters with a memory, whose updates may come late.
   virtual Report update(int sensor, const Numbers& z, double age) = 0;

@@ -300,6 +300,9 @@ class FilterOf : public Filter {
     return inner_.reset(matrix<typename Inner::State>(x0.data()),
                         matrix<typename Inner::Covariance>(P0.data()));
   }
+  Status limit_steps(double longest_step_s) override {
+    return inner_.limit_steps(Scalar(longest_step_s));
+  }
   Status predict(double dt, const Numbers& input) override {
     return InputOf<typename Inner::Process>::predict(inner_, Scalar(dt), input);
   }
@@ -453,6 +456,12 @@ class Late final : public Filter {
     const Status status = filter.reset(matrix<typename Kind::State>(x0.data()),
                                        matrix<typename Kind::Covariance>(P0.data()));
     if (status == Status::kOk) late_ = Updates(filter);
+    return status;
+  }
+  Status limit_steps(double longest_step_s) override {  // and forgets what came before
+    Robust<Kind> filter = late_.filter();
+    const Status status = filter.limit_steps(typename Kind::Scalar(longest_step_s));
+    late_ = Updates(filter);
     return status;
   }
   Status predict(double dt, const Numbers& input) override {

@@ -451,6 +451,8 @@ void refuses_predictions(const Member& member, Filter& filter, const Row& row) {
   with(Status::kNotFinite, kNan, row.input);
   with(Status::kNotFinite, kInfinity, row.input);
   with(Status::kTimeBackwards, -1e-6, row.input);
+  with(Status::kStepTooLong, 3600.001, row.input);
+  with(Status::kStepTooLong, member.most, row.input);
   for (std::size_t i = 0; i < row.input.size(); ++i) {
     Numbers input = row.input;
     input[i] = kNan;
@@ -461,7 +463,10 @@ void refuses_predictions(const Member& member, Filter& filter, const Row& row) {
   // A speed or a distance, or else the time, beyond what can be represented.
   Numbers input = row.input;
   if (!input.empty()) input[0] = member.most;
-  with(Status::kOverflow, input.empty() ? member.most : 10, input);
+  const auto unlimited = filter.clone();
+  REQUIRE(unlimited->limit_steps(kInfinity) == Status::kOk);
+  const auto too_far = [&] { return unlimited->predict(input.empty() ? member.most : 10, input); };
+  refuses(*unlimited, Status::kOverflow, too_far);
 }
 
 void refuses_updates(const Member& member, Filter& filter, const Row& row, double age) {
@@ -510,6 +515,49 @@ TEST_CASE("every filter: a call that is refused says why and changes nothing") {
     refuses_predictions(member, *filter, row);
     refuses_updates(member, *filter, row, 0);
     for (const Row& taken : rows) REQUIRE(step(*filter, taken) == step(*twin, taken));
+  }
+}
+
+TEST_CASE("every filter: a prediction is as long as longest_step_s at most") {
+  for (const Member& member : all_members()) {
+    CAPTURE(member.name);
+    const Numbers still(static_cast<std::size_t>(member.process->inputs), 0.0);
+    for (const double limit : {0.25, 30.0, 3600.0}) {
+      const auto filter = begun(member, member.whole());
+      for (const double none : {0.0, -1.0, kNan}) {
+        refuses(*filter, Status::kBadParameter, [&] { return filter->limit_steps(none); });
+      }
+      REQUIRE(filter->limit_steps(limit) == Status::kOk);
+      refuses(*filter, Status::kStepTooLong, [&] { return filter->predict(1.001 * limit, still); });
+      CHECK(filter->predict(limit, still) == Status::kOk);
+      CHECK(filter->predict(0, still) == Status::kOk);
+    }
+    const auto filter = begun(member, member.whole());
+    REQUIRE(filter->limit_steps(kInfinity) == Status::kOk);
+    refuses(*filter, Status::kNotFinite, [&] { return filter->predict(kInfinity, still); });
+    CHECK(filter->predict(7200, still) == Status::kOk);
+  }
+}
+
+TEST_CASE("every filter: a position so large that the format is coarse against P is refused") {
+  for (const Member& member : all_members()) {
+    CAPTURE(member.name);
+    // A sigma of 1: coarse where half a unit in the last place is above 1/8 (resolution.hpp).
+    const bool single = member.most < 1e39;
+    const double far = std::ldexp(1.0, single ? 22 : 51);
+    const std::size_t n = static_cast<std::size_t>(member.process->states);
+    Numbers p0 = prior(member);
+    for (std::size_t i = 0; i < 2; ++i) {
+      for (std::size_t j = 0; j < n; ++j) p0[i * n + j] = p0[j * n + i] = i == j ? 1 : 0;
+    }
+    for (const std::size_t axis : {0u, 1u}) {
+      Numbers x0 = start(member);
+      x0[axis] = -far;
+      const auto filter = begun(member, member.whole());
+      refuses(*filter, Status::kFarFromOrigin, [&] { return filter->reset(x0, p0); });
+      x0[axis] = 0.49 * far;
+      CHECK(filter->reset(x0, p0) == Status::kOk);
+    }
   }
 }
 

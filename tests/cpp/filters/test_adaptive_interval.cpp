@@ -113,6 +113,42 @@ TEST_CASE("adaptive interval: what cannot go on is not restored, and changes not
   CHECK(same(filter, before));
 }
 
+TEST_CASE("adaptive interval: a memory that no step leaves behind is not restored") {
+  Law filter = after_a_step();
+  const Law before = filter;
+  const auto refuses = [&](auto damage) {
+    Law::Policy policy = before.policy();
+    damage(policy.memory);
+    CHECK(filter.restore(filter.belief(), policy, 0.5) == Status::kBadParameter);
+    CHECK(same(filter, before));
+  };
+  using Memory = Law::Policy::Memory;
+  for (const double bad : {std::nan(""), HUGE_VAL, -HUGE_VAL}) {
+    refuses([bad](Memory& m) { m.tau = bad; });
+    refuses([bad](Memory& m) { m.interval = bad; });
+    refuses([bad](Memory& m) { m.ratio = bad; });
+    refuses([bad](Memory& m) { m.mahalanobis_squared = bad; });
+    for (int i = 0; i < 2; ++i) {
+      refuses([bad, i](Memory& m) { m.last_estimate(i) = bad; });
+      refuses([bad, i](Memory& m) { m.last_reference(i) = bad; });
+    }
+  }
+  refuses([](Memory& m) { m.tau = 1; });
+  refuses([](Memory& m) { m.tau = 0; });
+  refuses([](Memory& m) { m.interval = 0; });
+  refuses([](Memory& m) { m.ratio = 1.5; });
+  refuses([](Memory& m) { m.mahalanobis_squared = -1; });
+}
+
+TEST_CASE("adaptive interval: its check asks the policy, and the filter") {
+  CHECK(budgeted(0.1).check() == Status::kOk);
+  CHECK(budgeted(-1).check() == Status::kBadParameter);
+  auvest::Ukf<Process>::Params points;
+  points.alpha = 2;
+  CHECK(Budgeted{auvest::Ukf<Process>(Process(), points), budget(0.1)}.check() ==
+        Status::kBadParameter);
+}
+
 TEST_CASE("adaptive interval: a policy that is restored takes the place of a bad one") {
   Budgeted bad = budgeted(-1);
   Budgeted good = budgeted(0.1);

@@ -28,6 +28,7 @@ void check_gaps(const typename Filter::Process& process, const Sensor& sensor) {
     double least = 1;
     for (int start = 0; start < 40; ++start) {
       Filter filter{process};
+      REQUIRE(filter.limit_steps(Scalar(1e9)) == Status::kOk);
       typename Filter::State x;
       typename Filter::Covariance P = Filter::Covariance::Zero();
       for (int i = 0; i < 6; ++i) {

@@ -235,6 +235,71 @@ double needed(const Slave& filter, double error_m) {
   return error_m * error_m - (filter.P()(1, 1) + 1);
 }
 
+TEST_CASE("lock-out: five recoveries at once, then one in fifty ranges, and the status says so") {
+  Slave filter = patient(1);  // every rejection is followed by a recovery
+  double error_m = 8;
+  for (int k = 0; k < 5; ++k) {
+    CHECK(filter.status() == Status::kOk);
+    const double before = filter.P()(1, 1);
+    count_after(filter, 90, error_m);
+    CHECK(filter.P()(1, 1) > before + 0.5 * error_m * error_m);
+    error_m *= 10;  // ten sigma of the belief that has been widened for the last one
+  }
+  CHECK(filter.status() == Status::kRecoveriesRepeat);
+  const double before = filter.P()(1, 1);
+  const int count = count_after(filter, 90, error_m);
+  CHECK(count == 4);  // at the limit
+  CHECK(filter.P()(1, 1) == before);
+  // Ranges that are believed let the count run out: of 250 less 5 so far, to 205.
+  int ranges = 0;
+  while (filter.status() == Status::kRecoveriesRepeat) {
+    count_after(filter, 90, 0);
+    REQUIRE(++ranges < 100);
+  }
+  CHECK(ranges == 40);
+  count_after(filter, 90, error_m);
+  CHECK(filter.P()(1, 1) > 0.5 * error_m * error_m);
+  CHECK(filter.status() == Status::kRecoveriesRepeat);
+
+  REQUIRE(filter.reset(Vector<double, 2>(0, 0), Matrix<double, 2, 2>::Identity()) == Status::kOk);
+  CHECK(filter.status() == Status::kOk);
+  CHECK(Slave{auvest::Ekf<Process>(Process())}.status() == Status::kNotInitialised);
+}
+
+/// Recoveries of a slave that circles among three leaders, and ranges at whose end the status was
+/// kRecoveriesRepeat; each range is `scale` times as long as it should be.
+void circle(double scale, int& recoveries, int& repeated) {
+  Slave filter = patient(3);
+  const Range sensors[3] = {leader(300, 0), leader(-150, 260), leader(-150, -260)};
+  Random random(1);
+  Vector<double, 2> truth(0, 0);
+  recoveries = repeated = 0;
+  for (int k = 0; k < 1000; ++k) {
+    const double heading = 0.02 * k;
+    truth += 2 * Vector<double, 2>(std::cos(heading), std::sin(heading));
+    REQUIRE(filter.predict(2, Vector<double, 3>(1, 0, heading)) == Status::kOk);
+    Vector<double, 1> z = sensors[k % 3].h(truth);
+    z(0) = scale * z(0) + random.normal<double>();
+    const auto correction = filter.update(z, sensors[k % 3]);
+    REQUIRE(correction.status == Status::kOk);
+    recoveries += correction.recovered ? 1 : 0;
+    repeated += filter.status() == Status::kRecoveriesRepeat ? 1 : 0;
+  }
+}
+
+TEST_CASE(
+    "lock-out: a scale of the ranges is no wrong belief, and is not recovered from for ever") {
+  int recoveries = 0;
+  int repeated = 0;
+  circle(1, recoveries, repeated);
+  CHECK(recoveries == 0);
+  CHECK(repeated == 0);
+  circle(1.2, recoveries, repeated);
+  CHECK(recoveries >= 5);
+  CHECK(recoveries <= 5 + 1000 / 50);
+  CHECK(repeated > 500);
+}
+
 TEST_CASE("lock-out: a streak that ends by acceptances asks for nothing later") {
   Slave filter = patient(3);
   CHECK(count_after(filter, 90, 90) == 4);

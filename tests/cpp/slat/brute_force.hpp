@@ -8,6 +8,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "paper.hpp"
+
 #include "auvest/math/angle.hpp"
 #include "auvest/math/linear_algebra.hpp"
 #include "auvest/math/random.hpp"
@@ -38,7 +40,7 @@ struct Owner {
   Filter filter;
 
   Owner(const typename Filter::Motion& motion, const typename Filter::Master& master, int particles,
-        const typename Filter::Params& params = typename Filter::Params())
+        const typename Filter::Params& params = paper<typename Filter::Params>())
       : storage(Filter::Set::storage_size(particles)),
         filter(motion, master, params, storage.data(), particles) {}
 };
@@ -202,6 +204,7 @@ template <class Filter>
 void check_against_grid(const FarApart& problem, typename Filter::Params params) {
   const Grid grid(problem);
   const int particles = 100000;
+  params = paper(params);
   params.resample_below = 0;
   Owner<Filter> owner(problem.motion, Master<double>(), particles, params);
   problem.run(owner.filter, particles, 61);

@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 
 #include "close.hpp"
+#include "paper.hpp"
 
 #include <Eigen/LU>
 #include <cmath>
@@ -25,6 +26,7 @@ using auvest::SlatScenario;
 using auvest::Status;
 using auvest::Vector;
 using auvest::math::Random;
+using slat_test::OpenEkf;
 
 template <class Scalar>
 using Compass = auvest::CompassMotion<Scalar>;
@@ -44,8 +46,7 @@ TEST_CASE_TEMPLATE("EKF-SLAT: with a slave that is known it is the EKF of the ma
                    Scalar, float, double) {
   typename Compass<Scalar>::Params still;
   still.sigma_speed_m_s = still.sigma_heading_rad = Scalar(0);
-  auvest::EkfSlat<Compass<Scalar>, Master<Scalar>, 1> slat((Compass<Scalar>(still)),
-                                                           Master<Scalar>());
+  OpenEkf<Compass<Scalar>, Master<Scalar>, 1> slat((Compass<Scalar>(still)), Master<Scalar>());
   Random random(1);
   Belief<Scalar, 2> start;
   start.x << Scalar(10), Scalar(20);
@@ -86,7 +87,7 @@ void check_textbook(const Motion& motion, const Belief<double, Motion::kStates>&
                     auvest::Bearing bearing) {
   constexpr int pose = Motion::kStates;
   constexpr int n = pose + 12;
-  auvest::EkfSlat<Motion, Master<double>, 2> slat(motion, Master<double>());
+  OpenEkf<Motion, Master<double>, 2> slat(motion, Master<double>());
   Random random(2);
   REQUIRE(slat.reset(start, random) == Status::kOk);
   Eigen::Matrix<double, n, 1> x = Eigen::Matrix<double, n, 1>::Zero();
@@ -185,7 +186,7 @@ struct Consistency {
     auvest::Sonar<double>::Params sonar;
     sonar.sigma_range_m = scenario.sigma_range_m * std::sqrt(r_factor);
     sonar.sigma_bearing_rad = scenario.sigma_bearing_rad * std::sqrt(r_factor);
-    using Filter = auvest::EkfSlat<Compass<double>, Master<double>, 1>;
+    using Filter = OpenEkf<Compass<double>, Master<double>, 1>;
     const int runs = 60;
     double nees_sum = 0, nis_sum = 0;
     int updates = 0;
@@ -229,7 +230,7 @@ TEST_CASE("EKF-SLAT: NEES or NIS lie outside their bounds where Q or R is wrong 
 }
 
 TEST_CASE("EKF-SLAT: a result that would not be finite is refused, with all echoes of the ping") {
-  auvest::EkfSlat<Compass<float>, Master<float>, 2> slat((Compass<float>()), Master<float>());
+  OpenEkf<Compass<float>, Master<float>, 2> slat((Compass<float>()), Master<float>());
   Random random(4);
   Belief<float, 2> start;
   start.x.setZero();
@@ -253,7 +254,7 @@ TEST_CASE("EKF-SLAT: a result that would not be finite is refused, with all echo
 }
 
 TEST_CASE("EKF-SLAT: a gate that is negative or not finite is refused, and so is a bad model") {
-  using Filter = auvest::EkfSlat<Compass<double>, Master<double>, 1>;
+  using Filter = OpenEkf<Compass<double>, Master<double>, 1>;
   Random random(5);
   Belief<double, 2> start;
   start.x.setZero();
@@ -306,7 +307,7 @@ TEST_CASE("dead reckoning: the paper's bias in section 7 and its compensation") 
 }
 
 TEST_CASE("outage: starts from the last shared state, hands over when communication returns") {
-  using Filter = auvest::EkfSlat<Compass<double>, Master<double>, 1>;
+  using Filter = OpenEkf<Compass<double>, Master<double>, 1>;
   auvest::Outage<Filter, 1> outage(Filter((Compass<double>()), Master<double>()));
   Random random(3);
   const Vector<double, 2> u(5, 0.2);
@@ -360,7 +361,7 @@ TEST_CASE("outage: starts from the last shared state, hands over when communicat
 }
 
 TEST_CASE("outage: the filter has the masters that were shared last, no more") {
-  using Filter = auvest::EkfSlat<Compass<double>, Master<double>, 2>;
+  using Filter = OpenEkf<Compass<double>, Master<double>, 2>;
   auvest::Outage<Filter, 2> outage(Filter((Compass<double>()), Master<double>()));
   Random random(6);
   Belief<double, 2> slave;
@@ -377,7 +378,7 @@ TEST_CASE("outage: the filter has the masters that were shared last, no more") {
 }
 
 TEST_CASE("EKF-SLAT: the NIS of several echoes at one time is their sum, each after those before") {
-  using Filter = auvest::EkfSlat<Compass<double>, Master<double>, 2>;
+  using Filter = OpenEkf<Compass<double>, Master<double>, 2>;
   Filter together((Compass<double>()), Master<double>());
   Random random(3);
   Belief<double, 2> slave;
@@ -405,7 +406,7 @@ TEST_CASE("EKF-SLAT: the NIS of several echoes at one time is their sum, each af
 }
 
 TEST_CASE("SLAT filters: what is refused changes nothing; a reset begins anew") {
-  using Filter = auvest::EkfSlat<Compass<double>, Master<double>, 2>;
+  using Filter = OpenEkf<Compass<double>, Master<double>, 2>;
   Filter filter((Compass<double>()), Master<double>());
   Random random(4);
   const auvest::Sonar<double> sonar;
@@ -488,7 +489,7 @@ TEST_CASE("dead reckoning: reads the lower triangle of P and gives both") {
 }
 
 TEST_CASE("outage: a shared state that is refused leaves the one before") {
-  using Filter = auvest::EkfSlat<Compass<double>, Master<double>, 2>;
+  using Filter = OpenEkf<Compass<double>, Master<double>, 2>;
   auvest::Outage<Filter, 2> outage(Filter((Compass<double>()), Master<double>()));
   Random random(6);
   Belief<double, 2> slave;

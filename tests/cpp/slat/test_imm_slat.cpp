@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 
 #include "close.hpp"
+#include "paper.hpp"
 
 #include <Eigen/LU>
 #include <cmath>
@@ -19,11 +20,12 @@ namespace {
 
 using auvest::Belief;
 using auvest::Echo;
-using auvest::EkfSlat;
 using auvest::Matrix;
 using auvest::Status;
 using auvest::Vector;
 using auvest::math::Random;
+using slat_test::OpenEkf;
+using slat_test::paper;
 
 template <class Scalar>
 using Unicycle = auvest::UnicycleMotion<Scalar>;
@@ -51,7 +53,7 @@ struct Owner {
   Filter filter;
 
   Owner(const typename Filter::Motion& motion, const typename Filter::Master& master, int particles,
-        const typename Filter::Params& params = typename Filter::Params())
+        const typename Filter::Params& params = paper<typename Filter::Params>())
       : storage(Filter::Set::storage_size(particles)),
         filter(motion, master, params, storage.data(), particles) {}
 };
@@ -196,7 +198,7 @@ TEST_CASE("EKF-SLAT with an Imm: two masters, against the textbook over the join
   params.switch_rate_hz = 0.2;
   params.share << 0.7, 0.3;
   const Unicycle<double> motion;
-  EkfSlat<Unicycle<double>, Two, 2> slat(motion, Two(params));
+  OpenEkf<Unicycle<double>, Two, 2> slat(motion, Two(params));
   Random random(5);
   const auto start = slave_belief<double>(0.01);
   REQUIRE(slat.reset(start, random) == Status::kOk);
@@ -261,11 +263,11 @@ TEST_CASE("EKF-SLAT with an Imm: two masters, against the textbook over the join
 TEST_CASE("EKF-SLAT with an Imm: headings on both sides of the cut are mixed as any others") {
   // The same run about a heading of 0 and, turned by half a circle, about one of pi.
   for (int run = 0; run < 100; ++run) {
-    EkfSlat<Unicycle<double>, Three<double>, 1> filter[2];
+    OpenEkf<Unicycle<double>, Three<double>, 1> filter[2];
     Random random(6), world[2] = {Random(7), Random(7)};
     for (int turned = 0; turned < 2; ++turned) {
       const double sign = turned == 1 ? -1 : 1;
-      filter[turned] = EkfSlat<Unicycle<double>, Three<double>, 1>(Unicycle<double>(),
+      filter[turned] = OpenEkf<Unicycle<double>, Three<double>, 1>(Unicycle<double>(),
                                                                    three_models<double>(0.5));
       auto start = slave_belief<double>(0.01);
       start.x << 0, 0, 0.002 * (run - 50) + (turned == 1 ? auvest::math::pi<double>() : 0);
@@ -328,8 +330,8 @@ TEST_CASE_TEMPLATE("Imm: where one model has probability 1 and no other follows,
   only.share << Scalar(1), Scalar(0), Scalar(0);
   const Three<Scalar> master(only);
   const Unicycle<Scalar> motion;
-  EkfSlat<Unicycle<Scalar>, Three<Scalar>, 1> imm(motion, master);
-  EkfSlat<Unicycle<Scalar>, Straight<Scalar>, 1> plain(motion, Straight<Scalar>());
+  OpenEkf<Unicycle<Scalar>, Three<Scalar>, 1> imm(motion, master);
+  OpenEkf<Unicycle<Scalar>, Straight<Scalar>, 1> plain(motion, Straight<Scalar>());
   check_same_bits<Scalar>(imm, plain);
   using Imm1 = auvest::Slatf1<Unicycle<Scalar>, Three<Scalar>, 1>;
   using Plain1 = auvest::Slatf1<Unicycle<Scalar>, Straight<Scalar>, 1>;
@@ -347,7 +349,7 @@ TEST_CASE("Imm: with a slave that is known, one particle is the joint filter") {
   Unicycle<double>::Params still;
   still.sigma_speed_m_s = still.sigma_yaw_rate_rad_s = 0;
   const Unicycle<double> motion(still);
-  EkfSlat<Unicycle<double>, Three<double>, 1> joint(motion, three_models<double>(0.1));
+  OpenEkf<Unicycle<double>, Three<double>, 1> joint(motion, three_models<double>(0.1));
   using Filter = auvest::Slatf1<Unicycle<double>, Three<double>, 1>;
   Owner<Filter> owner(motion, three_models<double>(0.1), 1);
   Random random(9);
@@ -470,7 +472,7 @@ void check_manoeuvre(Filter& filter) {
 }
 
 TEST_CASE_TEMPLATE("Imm: a turn is recognised, and its end", Scalar, float, double) {
-  EkfSlat<Unicycle<Scalar>, Three<Scalar>, 1> joint(drifting<Scalar>(),
+  OpenEkf<Unicycle<Scalar>, Three<Scalar>, 1> joint(drifting<Scalar>(),
                                                     manoeuvring_models<Scalar>());
   check_manoeuvre(joint);
   using Filter = auvest::Slatf2<Unicycle<Scalar>, Three<Scalar>, 1>;
@@ -515,7 +517,7 @@ void check_survival(Filter& filter) {
 TEST_CASE("Imm: whatever is heard, and after a long silence, numbers stay numbers") {
   for (const float gate : {0.0f, 16.0f}) {
     CAPTURE(gate);
-    using Joint = EkfSlat<Unicycle<float>, Three<float>, 1>;
+    using Joint = OpenEkf<Unicycle<float>, Three<float>, 1>;
     Joint::Params joint_params;
     joint_params.gate = gate;
     Joint joint(Unicycle<float>(), three_models<float>(0.1), joint_params);
@@ -536,9 +538,9 @@ TEST_CASE("EKF-SLAT with an Imm: the NIS is the mean over the hypotheses before 
   params.switch_rate_hz = 0;
   params.share << 0.7, 0.3;
   const Unicycle<double> motion;
-  EkfSlat<Unicycle<double>, Two, 1> both(motion, Two(params));
-  EkfSlat<Unicycle<double>, Straight<double>, 1> straight(motion, Straight<double>());
-  EkfSlat<Unicycle<double>, Accelerated<double>, 1> accelerated(motion, Accelerated<double>());
+  OpenEkf<Unicycle<double>, Two, 1> both(motion, Two(params));
+  OpenEkf<Unicycle<double>, Straight<double>, 1> straight(motion, Straight<double>());
+  OpenEkf<Unicycle<double>, Accelerated<double>, 1> accelerated(motion, Accelerated<double>());
   Random random(42);
   auto master = master_belief<double>(60, 80);
   master.x(4) = 0.5;  // which the first takes for nothing
@@ -569,7 +571,7 @@ TEST_CASE("EKF-SLAT with an Imm: the NIS is the mean over the hypotheses before 
 }
 
 TEST_CASE("EKF-SLAT with an Imm: an echo that overflows in all hypotheses is refused") {
-  using Filter = EkfSlat<Unicycle<float>, Three<float>, 2>;
+  using Filter = OpenEkf<Unicycle<float>, Three<float>, 2>;
   Filter filter(Unicycle<float>(), three_models<float>(0.1));
   Random random(43);
   REQUIRE(filter.reset(slave_belief<float>(0.01), random) == Status::kOk);
@@ -598,7 +600,7 @@ TEST_CASE("EKF-SLAT with an Imm: an echo that overflows in all hypotheses is ref
 }
 
 TEST_CASE("EKF-SLAT with an Imm: what is refused leaves it as it was") {
-  using Filter = EkfSlat<Unicycle<double>, Three<double>, 1>;
+  using Filter = OpenEkf<Unicycle<double>, Three<double>, 1>;
   Random random(41);
   Filter filter(Unicycle<double>(), three_models<double>(0.1));
   const auto sonar = sonar_from_heading<double>();

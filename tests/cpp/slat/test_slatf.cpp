@@ -117,7 +117,7 @@ TEST_CASE("SLATF 2.0: the drawn pose has the mean and the covariance of the cond
   problem.start.P.setZero();
   const Grid grid(problem);
   const int particles = 100000;
-  auvest::SlatfParams<double> params;
+  auto params = paper<auvest::SlatfParams<double>>();
   params.resample_below = 0;
   Owner<auvest::Slatf2<Compass<double>, Master<double>, 1>> owner(problem.motion, Master<double>(),
                                                                   particles, params);
@@ -139,7 +139,7 @@ void check_independence() {
   using Scalar = typename Filter::Scalar;
   constexpr int masters = Filter::kMasters;
   const int particles = 40;
-  typename Filter::Params params;
+  auto params = paper<typename Filter::Params>();
   params.resample_below = Scalar(0);
   Owner<Filter> owner((typename Filter::Motion()), Master<Scalar>(), particles, params);
   Filter& filter = owner.filter;
@@ -349,7 +349,7 @@ TEST_CASE("SLATF 2.0: Eq. (50) to the letter keeps Sigma after the draw, the def
   for (const bool carry : {false, true}) {
     FarApart problem;
     problem.start.P.setZero();
-    auvest::SlatfParams<double> params;
+    auto params = paper<auvest::SlatfParams<double>>();
     params.carry_covariance = carry;
     params.resample_below = 0;
     using Filter = auvest::Slatf2<Compass<double>, Master<double>, 1>;
@@ -495,7 +495,7 @@ typename Filter::Set& particles_of(Filter& filter) {
 
 TEST_CASE("SLATF 1.0: a particle whose correction overflows weighs nothing, the others as before") {
   using Filter = auvest::Slatf1<Compass<float>, Master<float>, 1>;
-  Filter::Params params;
+  auto params = paper<Filter::Params>();
   params.resample_below = 0;
   const int particles = 5;
   const auvest::Sonar<float> sonar;
@@ -546,7 +546,7 @@ TEST_CASE("SLATF: a master is born where the echo comes from, as far as the slav
   // rad.
   using First = auvest::Slatf1<auvest::UnicycleMotion<double>, Master<double>, 1>;
   using Second = auvest::Slatf2<auvest::UnicycleMotion<double>, Master<double>, 1>;
-  auvest::SlatfParams<double> params;
+  auto params = paper<auvest::SlatfParams<double>>();
   params.gate = 16;
   params.birth_velocity_m_s = 2;
   auvest::Sonar<double>::Params device;
@@ -582,7 +582,7 @@ TEST_CASE("SLATF: a master is born where the echo comes from, as far as the slav
 TEST_CASE_TEMPLATE("SLATF: a master is born from an echo that nobody expects, once", Filter,
                    auvest::Slatf1<Compass<double>, Master<double>, 2>,
                    auvest::Slatf2<Compass<double>, Master<double>, 2>) {
-  typename Filter::Params params;
+  auto params = paper<typename Filter::Params>();
   params.gate = 16;
   params.birth_velocity_m_s = 2;
   Owner<Filter> owner((Compass<double>()), Master<double>(), 200, params);

@@ -184,7 +184,7 @@ TEST_CASE("SlatfJoint: 1e5 particles are the posterior of a grid, whatever they 
           doctest::test_suite("statistics")) {
   for (const double kept : {0.0, 0.5}) {
     FarApart problem;
-    Joint<double, 1>::Params params;
+    auto params = paper<Joint<double, 1>::Params>();
     params.kept = kept;
     check_against_grid<Joint<double, 1>>(problem, params);
     problem.hear(1, -0.001);
@@ -205,7 +205,7 @@ TEST_CASE("SlatfJoint: where the sonar is linear the mixture is the Kalman filte
   sonar_params.sigma_bearing_rad = 0.001;
   const auvest::Sonar<double> sonar(sonar_params);
   for (const double kept : {0.0, 0.5}) {
-    Filter::Params params;
+    auto params = paper<Filter::Params>();
     params.kept = kept;
     params.resample_below = 0.9;
     const int particles = 10000;
@@ -271,7 +271,7 @@ struct Started {
   Echo<float> seen[2];
   Vector<float, 2> u;
 
-  explicit Started(const Joint<float, 2>::Params& params = Joint<float, 2>::Params())
+  explicit Started(const Joint<float, 2>::Params& params = paper<Joint<float, 2>::Params>())
       : owner(Compass<float>(), Master<float>(), 50, params), random(51), u(5, 0.1f) {
     Belief<float, 2> start;
     start.x << 1, 2;

@@ -69,6 +69,9 @@ class AdaptiveInterval : public Filter {
     return Status::kOk;
   }
 
+  /// As that of the filter; first, whether a parameter of the policy is out of range.
+  Status check() const { return policy_check_ != Status::kOk ? policy_check_ : Filter::check(); }
+
   Scalar interval() const { return interval_; }  ///< T(k) [s]
   const Policy& policy() const { return policy_; }
 

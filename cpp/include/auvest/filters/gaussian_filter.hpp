@@ -11,9 +11,11 @@
 #pragma once
 
 #include <cstring>
+#include <limits>
 
 #include "auvest/filters/square_root_update.hpp"
 #include "auvest/math/linear_algebra.hpp"
+#include "auvest/math/resolution.hpp"
 #include "auvest/status.hpp"
 #include "auvest/types.hpp"
 
@@ -29,45 +31,65 @@ class GaussianFilter {
   using State = Vector<Scalar, kStates>;
   using Covariance = Matrix<Scalar, kStates, kStates>;
   using BeliefType = Belief<Scalar, kStates>;
+  static constexpr int kLongestStep = 3600;  ///< what longest_step_s() is unless it is set [s]
 
   /// `check` says whether all parameters are in range: asked once, and where they are constants, by
   /// the compiler.
   GaussianFilter(const Process& process, Status check)
-      : process_(process), check_(check), initialised_(false) {
+      : process_(process),
+        longest_step_(Scalar(kLongestStep)),
+        ready_(check == Status::kOk ? Status::kNotInitialised : check) {
     math::set_zero(belief_.x);
     math::set_zero(belief_.P);
   }
 
-  /// Sets the belief. Only the lower triangle of P0 is read.
+  /// Sets the belief. Only the lower triangle of P0 is read. kFarFromOrigin where the position, the
+  /// first two states, is too large for the format to tell apart what P0 does: coordinates count
+  /// from an origin nearby.
   Status reset(const State& x0, const Covariance& P0) {
-    if (check_ != Status::kOk) return check_;
+    if (check() != Status::kOk) return check();
     if (!math::all_finite(x0) || !math::lower_finite(P0)) return Status::kNotFinite;
     if (!math::is_positive_definite(P0)) return Status::kNotPositiveDefinite;
+    if (is_far(x0, P0)) return Status::kFarFromOrigin;
     math::copy(x0, belief_.x);
     math::copy(P0, belief_.P);
-    initialised_ = true;
+    ready_ = Status::kOk;
     return Status::kOk;
   }
 
   /// Takes back a belief saved from belief(): the same bits go on.
   Status restore(const BeliefType& saved) {
+    if (check() != Status::kOk) return check();
     if (!math::all_finite(saved)) return Status::kNotFinite;
     Covariance p = saved.P;
     if (!math::ldlt(p)) return Status::kNotPositiveDefinite;
     belief_ = saved;
-    initialised_ = true;
+    ready_ = Status::kOk;
     return Status::kOk;
   }
 
-  /// Carries the belief dt >= 0 seconds forward.
+  /// A longer prediction is refused: what a clock that jumped asks for, a wrong unit of time, or a
+  /// time since another start, and what no process noise was made for. Infinity: no limit. Refuses
+  /// what is not above 0.
+  Status limit_steps(Scalar longest_step_s) {
+    if (!(longest_step_s > Scalar(0))) return Status::kBadParameter;
+    const Scalar most = (std::numeric_limits<Scalar>::max)();
+    longest_step_ = longest_step_s < most ? longest_step_s : most;
+    return Status::kOk;
+  }
+  /// The largest finite number: no limit.
+  Scalar longest_step_s() const { return longest_step_; }
+
+  /// Carries the belief 0 <= dt <= longest_step_s() seconds forward. kFarFromOrigin where it would
+  /// come so far from the origin that the format no longer tells positions apart as P does.
   AUVEST_OUTLINE Status predict(Scalar dt) {
-    if (!initialised_) return Status::kNotInitialised;
-    if (!math::is_finite(dt)) return Status::kNotFinite;
-    if (dt < Scalar(0)) return Status::kTimeBackwards;
+    if (!initialised()) return Status::kNotInitialised;
+    if (!math::within(dt, Scalar(0), longest_step_)) return no_step(dt);
     BeliefType before;
     math::copy(belief_, before);
     Status status = derived().predict_belief(belief_, dt);
     if (status == Status::kOk && !math::all_finite(belief_)) status = Status::kOverflow;
+    if (status == Status::kOk && is_far(belief_.x, belief_.P)) status = Status::kFarFromOrigin;
     if (status != Status::kOk) math::copy(before, belief_);
     return status;
   }
@@ -113,8 +135,10 @@ class GaussianFilter {
   /// The belief as the filter holds it: only the lower triangle of its P has a meaning.
   const BeliefType& belief() const { return belief_; }
   /// kBadParameter if a parameter of the filter or its process is out of range: no reset then.
-  Status check() const { return check_; }
-  bool initialised() const { return initialised_; }
+  Status check() const {
+    return initialised() || ready_ == Status::kNotInitialised ? Status::kOk : ready_;
+  }
+  bool initialised() const { return ready_ == Status::kOk; }
   const Process& process() const { return process_; }
 
  protected:
@@ -125,8 +149,10 @@ class GaussianFilter {
   template <class Model, class Rule, class Report>
   AUVEST_INLINE Status correct(const typename Model::Measurement& z, const Model& model,
                                Rule&& rule, Report& correction) {
-    if (!initialised_) return Status::kNotInitialised;
+    if (!initialised()) return Status::kNotInitialised;
     if (!math::all_finite(z)) return Status::kNotFinite;
+    const Status admitted = model.admits(z);
+    if (admitted != Status::kOk) return admitted;
 
     constexpr int kSize = Model::kSize;
     constexpr int kObserved = Model::kObserved;
@@ -159,10 +185,25 @@ class GaussianFilter {
     return Status::kOk;
   }
 
+  /// Whether the format is coarse at one of the first two states, the position, against P.
+  AUVEST_OUTLINE static bool is_far(const State& x, const Covariance& P) {
+    bool far = false;
+    for (int i = 0; i < (kStates < 2 ? kStates : 2); ++i) {
+      far = far || math::is_coarse(x(i), P(i, i));
+    }
+    return far;
+  }
+
+  /// Why dt is no step to predict.
+  static Status no_step(Scalar dt) {
+    if (!math::is_finite(dt)) return Status::kNotFinite;
+    return dt < Scalar(0) ? Status::kTimeBackwards : Status::kStepTooLong;
+  }
+
   Process process_;
   BeliefType belief_;
-  Status check_;
-  bool initialised_;
+  Scalar longest_step_;  // finite, so that a dt within it is
+  Status ready_;         // kOk: has a belief; kNotInitialised: has none yet; else: as check() says
 };
 
 }  // namespace AUVEST_INSTRUCTIONS

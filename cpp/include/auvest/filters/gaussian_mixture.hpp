@@ -155,7 +155,8 @@ struct GaussianMixture {
   /// own mean covariance is below `limit`. Every further state counts for itself.
   AUVEST_OUTLINE void merge(Scalar limit) {
     Nearest nearest[K];  // of each, among those behind it
-    for (int i = 0; i < size; ++i) nearest[i] = nearest_of(i, limit);
+    for (int i = 0; i < size; ++i) nearest[i].reach = reach_of(i, limit);
+    for (int i = 0; i < size; ++i) find_nearest(nearest, i, limit);
     while (size > 1) {
       int first = 0;
       for (int i = 1; i < size; ++i) {
@@ -166,14 +167,15 @@ struct GaussianMixture {
       join(first, second);
       // Only what was near to one of the two is looked for anew.
       for (int i = second; i < size; ++i) nearest[i] = nearest[i + 1];
+      nearest[first].reach = reach_of(first, limit);
       for (int i = 0; i < size; ++i) {
         Nearest& known = nearest[i];
         const int index = known.index;
         if (index > second) --known.index;
         if (i == first || index == first || index == second) {
-          known = nearest_of(i, limit);
+          find_nearest(nearest, i, limit);
         } else if (i < first) {
-          const Scalar apart = distance2(i, first, limit);
+          const Scalar apart = distance2(i, first, known.reach + nearest[first].reach, limit);
           if (apart < known.distance2 || (apart == known.distance2 && first < known.index)) {
             known.distance2 = apart;
             known.index = static_cast<std::uint8_t>(first);
@@ -196,8 +198,47 @@ struct GaussianMixture {
   ///
   /// where no digit is lost, however wide the prior. Further states follow by their regression on
   /// the position. False if P is not positive definite: nothing has changed then.
-  AUVEST_OUTLINE bool ring(const Belief<Scalar, N>& prior, const RangeCircle<Scalar>& circle,
-                           int count) {
+  bool ring(const Belief<Scalar, N>& prior, const RangeCircle<Scalar>& circle, int count) {
+    if (!lay_ring(prior, circle, count, 0, Scalar(0))) return false;
+    size = static_cast<std::uint8_t>(count);
+    weigh_logarithms();
+    return true;
+  }
+
+  /// Replaces each component by its own product with a ring of `count`, as above. Components of one
+  /// position and several headings are told apart by what follows, and not by their moments.
+  bool rings(const RangeCircle<Scalar>& circle, int count) {
+    for (int k = 0; k < size; ++k) {
+      if (!(component[k].P(0, 0) > Scalar(0)) || !(component[k].P(1, 1) > Scalar(0))) return false;
+    }
+    for (int k = size - 1; k >= 0; --k) {  // a ring lies at its prior's place or behind it
+      Belief<Scalar, N> prior;
+      math::copy(component[k], prior);
+      lay_ring(prior, circle, count, k * count, math::log(weight[k]));
+    }
+    size = static_cast<std::uint8_t>(size * count);
+    weigh_logarithms();
+    return true;
+  }
+
+  /// True if it can be what a filter left: so many components at most.
+  bool valid(int most) const {
+    if (size < 1 || size > most) return false;
+    Scalar sum = Scalar(0);
+    for (int k = 0; k < size; ++k) {
+      if (!math::is_positive(weight[k])) return false;
+      sum = sum + weight[k];
+      if (!math::all_finite(component[k].x) || !math::lower_finite(component[k].P)) return false;
+      Matrix<Scalar, N, N> p = component[k].P;
+      if (!math::ldlt(p)) return false;
+    }
+    return math::within(sum, Scalar(0.999), Scalar(1.001));
+  }
+
+ private:
+  /// The components of a ring from number `first` on, with the logarithms of their weights.
+  AUVEST_OUTLINE bool lay_ring(const Belief<Scalar, N>& prior, const RangeCircle<Scalar>& circle,
+                               int count, int first, Scalar log_prior) {
     using math::larger;
     using math::sqrt;
     Matrix<Scalar, 2, 2> root;
@@ -214,7 +255,6 @@ struct GaussianMixture {
     const Scalar distance = sqrt(dx * dx + dy * dy);
     const Scalar first_x = distance > Scalar(0) ? dx / distance : Scalar(1);
     const Scalar first_y = distance > Scalar(0) ? dy / distance : Scalar(0);
-    Scalar most = Scalar(0);
     for (int k = 0; k < count; ++k) {
       Scalar sine, cosine;
       math::sincos(Scalar(2 * k) * s, sine, cosine);
@@ -235,12 +275,11 @@ struct GaussianMixture {
       const Scalar y_t = (d_t - p_ut * y_u) / s_tt;
       const Scalar log_weight =
           Scalar(-0.5) * (d_u * y_u + d_t * y_t + math::log(s_uu) + math::log(s_tt));
-      weight[k] = larger(Scalar(-1e30), log_weight);
-      if (k == 0 || weight[k] > most) most = weight[k];
+      weight[first + k] = larger(Scalar(-1e30), log_prior + log_weight);
 
       const Scalar along = radius - r_u * y_u;
       const Scalar across = -(r_t * y_t);
-      Belief<Scalar, N>& one = component[k];
+      Belief<Scalar, N>& one = component[first + k];
       math::copy(prior, one);
       one.x(0) = circle.centre[0] + (along * ux - across * uy);
       one.x(1) = circle.centre[1] + (along * uy + across * ux);
@@ -255,60 +294,55 @@ struct GaussianMixture {
       one.P(1, 1) = new_uu * (uy * uy) + new_tt * (ux * ux) + twice;
       carry(prior, slope, one);
     }
-    size = static_cast<std::uint8_t>(count);
-    for (int k = 0; k < count; ++k) {
-      const Scalar relative = weight[k] - most;
-      weight[k] = relative > Scalar(-80) ? math::exp(relative) : Scalar(0);
-    }
     return true;
   }
 
-  /// True if it can be what a filter left: so many components at most.
-  bool valid(int most) const {
-    if (size < 1 || size > most) return false;
-    Scalar sum = Scalar(0);
+  /// From logarithms to weights, the heaviest 1.
+  void weigh_logarithms() {
+    Scalar most = weight[0];
+    for (int k = 1; k < size; ++k) most = math::larger(most, weight[k]);
     for (int k = 0; k < size; ++k) {
-      if (!math::is_positive(weight[k])) return false;
-      sum = sum + weight[k];
-      if (!math::all_finite(component[k].x) || !math::lower_finite(component[k].P)) return false;
-      Matrix<Scalar, N, N> p = component[k].P;
-      if (!math::ldlt(p)) return false;
+      const Scalar relative = weight[k] - most;
+      weight[k] = relative > Scalar(-80) ? math::exp(relative) : Scalar(0);
     }
-    return math::within(sum, Scalar(0.999), Scalar(1.001));
   }
 
- private:
   struct Nearest {
     Scalar distance2;    ///< `limit` where none is nearer
-    std::uint8_t index;  ///< its own then
+    Scalar reach;        ///< of the component itself: see distance2()
+    std::uint8_t index;  ///< its own where none is nearer
   };
 
+  Scalar reach_of(int i, Scalar limit) const {
+    return Scalar(0.5) * limit * (component[i].P(0, 0) + component[i].P(1, 1));
+  }
+
   /// The lower index where two are as near.
-  AUVEST_OUTLINE Nearest nearest_of(int i, Scalar limit) const {
-    Nearest nearest = {limit, static_cast<std::uint8_t>(i)};
+  AUVEST_OUTLINE void find_nearest(Nearest* nearest, int i, Scalar limit) const {
+    Nearest& own = nearest[i];
+    own.distance2 = limit;
+    own.index = static_cast<std::uint8_t>(i);
     for (int j = i + 1; j < size; ++j) {
-      const Scalar apart = distance2(i, j, limit);
-      if (apart < nearest.distance2) {
-        nearest.distance2 = apart;
-        nearest.index = static_cast<std::uint8_t>(j);
+      const Scalar apart = distance2(i, j, own.reach + nearest[j].reach, limit);
+      if (apart < own.distance2) {
+        own.distance2 = apart;
+        own.index = static_cast<std::uint8_t>(j);
       }
     }
-    return nearest;
   }
 
   /// d' ((P_i + P_j) / 2)^-1 d of the position, and d^2 over the mean variance of every further
-  /// state; `limit` where it is no less than that.
-  AUVEST_OUTLINE Scalar distance2(int i, int j, Scalar limit) const {
+  /// state; `limit` where it is no less than that. `reach`: the sum of both. No direction is wider
+  /// than the trace says, so that most pairs are done with at once.
+  AUVEST_OUTLINE Scalar distance2(int i, int j, Scalar reach, Scalar limit) const {
     const Belief<Scalar, N>& one = component[i];
     const Belief<Scalar, N>& other = component[j];
-    // No direction is wider than the trace says: most pairs are done with here.
-    const Scalar s_xx = one.P(0, 0) + other.P(0, 0);
-    const Scalar s_yy = one.P(1, 1) + other.P(1, 1);
-    const Scalar reach = Scalar(0.5) * limit * (s_xx + s_yy);
     const Scalar dx = one.x(0) - other.x(0);
     if (dx * dx > reach) return limit;
     const Scalar dy = one.x(1) - other.x(1);
     if (dy * dy > reach) return limit;
+    const Scalar s_xx = one.P(0, 0) + other.P(0, 0);
+    const Scalar s_yy = one.P(1, 1) + other.P(1, 1);
     const Scalar s_yx = one.P(1, 0) + other.P(1, 0);
     const Scalar q = s_yx / s_xx;
     const Scalar rest = math::larger(s_yy - q * s_yx, math::pivot_floor(s_yy));

@@ -64,6 +64,7 @@ template <class Scalar, int N, int K>
 struct GaussianSumState {
   GaussianMixture<Scalar, N, K> mixture;  ///< its components count where there are several
   std::uint8_t accepted = 0;              ///< ranges since it was not converged or ambiguous, to 6
+  std::uint8_t headings = 1;              ///< of which each is to have a ring of its own
   Scalar bend = Scalar(0);  ///< 3 sqrt(2) sigma z of the last range: a wider variance bends
 };
 
@@ -103,10 +104,39 @@ class GaussianSum : public Robust_ {
     return status;
   }
 
+  /// The same with a heading, the third state, that is not known at all: `headings` components, 2
+  /// and more, whose sigma is half of their distance. The heading of x0 and its part of P0 do not
+  /// count. The first range from a wide position makes a ring of each; K must be 8 times as many.
+  Status reset(const State& x0, const Covariance& P0, int headings) {
+    static_assert(kStates >= 3, "the third state is the heading");
+    if (params_check_ != Status::kOk) return params_check_;
+    if (headings < 2 || headings * 8 > params_.components) return Status::kBadParameter;
+    const Scalar apart = math::two_pi<Scalar>() / Scalar(headings);
+    BeliefType one;
+    math::copy(x0, one.x);
+    math::copy(P0, one.P);
+    for (int i = 0; i < kStates; ++i) one.P(2, i) = one.P(i, 2) = Scalar(0);
+    one.P(2, 2) = Scalar(0.25) * (apart * apart);
+    one.x(2) = Scalar(0);
+    const Status status = Base::reset(one.x, one.P);
+    if (status != Status::kOk) return status;
+    forget();
+    Mixture& mixture = state_.mixture;
+    for (int k = 0; k < headings; ++k) {
+      one.x(2) = Scalar(k) * apart;
+      mixture.weight[k] = Scalar(1) / Scalar(headings);
+      math::copy(one, mixture.component[k]);
+    }
+    mixture.size = state_.headings = static_cast<std::uint8_t>(headings);
+    mixture.moments(this->belief_in_place());
+    return Status::kOk;
+  }
+
   /// Takes back what belief(), rule() and state() gave: the same bits go on.
   Status restore(const BeliefType& saved, const Rule& rule, const SumState& state) {
     const bool several = state.mixture.size > 1;
-    if (state.mixture.size < 1 || state.accepted > kConfirmed ||
+    if (state.mixture.size < 1 || state.accepted > kConfirmed || state.headings < 1 ||
+        (state.headings > 1 && state.headings * 8 > params_.components) ||
         !math::is_nonnegative(state.bend) ||
         (several && !state.mixture.valid(params_.components))) {
       return Status::kBadParameter;
@@ -204,6 +234,26 @@ class GaussianSum : public Robust_ {
     Status check() const { return Status::kOk; }
   };
 
+  /// A rule that looks and leaves the belief alone: an acceptance, as a ring is one.
+  struct Look {
+    template <int O, int U>
+    Status operator()(BeliefType&, Matrix<Scalar, O, O>&, const Matrix<Scalar, U, O>&,
+                      Matrix<Scalar, 1, O>& a, Matrix<Scalar, 1, 1>& noise,
+                      RobustCorrection<Scalar, 1>& correction) const {
+      using math::sqrt;
+      if (!(noise(0, 0) > Scalar(0))) return Status::kNotPositiveDefinite;
+      innovation_covariance(a, noise, correction.S);
+      const Scalar t = correction.innovation(0) / sqrt(correction.S(0, 0));
+      correction.standardised(0) = t;
+      correction.nis = t * t;
+      correction.weight(0) = Scalar(1);
+      correction.decision = Decision::kAccepted;
+      correction.iterations = 1;
+      correction.recovered = false;
+      return math::is_finite(correction.nis) ? Status::kOk : Status::kOverflow;
+    }
+  };
+
   static Status check(const Params& params) {
     const bool valid =
         math::within(params.outlier_share, Scalar(0.001), Scalar(0.5)) &&
@@ -215,6 +265,7 @@ class GaussianSum : public Robust_ {
   void forget() {
     state_.mixture.size = 1;
     state_.accepted = 0;
+    state_.headings = 1;
     state_.bend = Scalar(0);
   }
 
@@ -227,31 +278,20 @@ class GaussianSum : public Robust_ {
 
   /// The displacement and its noise are the same for all: those of a belief of zeros.
   Status predict_all(Scalar dt, Translates<true>) {
-    BeliefType& step = this->belief_in_place();
-    BeliefType whole;
-    math::copy(step, whole);
+    const Status status = Base::predict(dt);  // of the moments
+    if (status != Status::kOk) return status;
+    BeliefType step;
     math::set_zero(step.x);
     math::set_zero(step.P);
-    Status status = Base::predict(dt);
-    BeliefType moved;
-    math::copy(whole, moved);
-    if (status == Status::kOk) {
-      move(step, moved);
-      if (!math::all_finite(moved)) status = Status::kOverflow;
+    this->predict_belief(step, dt);
+    for (int k = 0; k < size(); ++k) {
+      BeliefType& one = state_.mixture.component[k];
+      for (int i = 0; i < kStates; ++i) {
+        one.x(i) = one.x(i) + step.x(i);
+        for (int j = 0; j <= i; ++j) one.P(i, j) = one.P(i, j) + step.P(i, j);
+      }
     }
-    if (status == Status::kOk) {
-      for (int k = 0; k < size(); ++k) move(step, state_.mixture.component[k]);
-      math::copy(moved, whole);
-    }
-    math::copy(whole, step);
     return status;
-  }
-
-  AUVEST_OUTLINE static void move(const BeliefType& step, BeliefType& belief) {
-    for (int i = 0; i < kStates; ++i) {
-      belief.x(i) = belief.x(i) + step.x(i);
-      for (int j = 0; j <= i; ++j) belief.P(i, j) = belief.P(i, j) + step.P(i, j);
-    }
   }
 
   /// Twice: the first time to see that none is refused.
@@ -286,8 +326,6 @@ class GaussianSum : public Robust_ {
   template <class Model, class Report>
   Status take(const typename Model::Measurement& z, const Model& model, Report& correction,
               IsCircle<true>) {
-    if (!this->initialised()) return Status::kNotInitialised;
-    if (!math::is_finite(z(0))) return Status::kNotFinite;
     using math::sqrt;
     const Scalar noise = model.R()(0, 0);
     RangeCircle<Scalar> circle;
@@ -298,14 +336,18 @@ class GaussianSum : public Robust_ {
     if (params_.components > 1 && math::is_positive(noise)) {
       const Covariance& p = this->belief().P;
       if (size() > 1 || p(0, 0) + p(1, 1) > Scalar(9) * noise) {
+        // Whatever a filter refuses is refused before anything changes.
+        const Status status = this->correct(z, model, Look(), correction);
+        if (status != Status::kOk) return status;
         if (!within_range(circle)) return Status::kOverflow;
-        if (wide(circle)) return ring(circle, bend, correction);
+        if (wide(circle)) return ring(circle, bend);
         refine(circle, bend);
       }
     }
     const Status status = update_all(z, model, correction);
     if (status != Status::kOk) return status;
     if (size() > 1) tidy();
+    state_.headings = 1;
     count(correction, bend);
     return status;
   }
@@ -336,28 +378,15 @@ class GaussianSum : public Robust_ {
     return true;
   }
 
-  template <class Report>
-  AUVEST_OUTLINE Status ring(const RangeCircle<Scalar>& circle, Scalar bend, Report& correction) {
-    const BeliefType& whole = this->belief();
-    const Scalar dx = whole.x(0) - circle.centre[0];
-    const Scalar dy = whole.x(1) - circle.centre[1];
-    if (!state_.mixture.ring(whole, circle, params_.components)) {
-      return Status::kNotPositiveDefinite;
-    }
-    // What a plain update would report, before the circle was seen to bend.
-    using math::sqrt;
-    const Scalar range = sqrt(dx * dx + dy * dy);
-    const Scalar along = range > Scalar(0) ? variance_along(whole.P, dx / range, dy / range)
-                                           : Scalar(0.5) * (whole.P(0, 0) + whole.P(1, 1));
-    correction.clear(Status::kOk);
-    correction.innovation(0) = circle.radius - range;
-    correction.S(0, 0) = along + circle.sigma * circle.sigma;
-    correction.standardised(0) = correction.innovation(0) / sqrt(correction.S(0, 0));
-    correction.nis = correction.standardised(0) * correction.standardised(0);
-    correction.weight(0) = Scalar(1);
-    correction.iterations = 1;
+  AUVEST_OUTLINE Status ring(const RangeCircle<Scalar>& circle, Scalar bend) {
+    const int parts = size() == state_.headings ? size() : 1;
+    const int each = params_.components / parts;
+    const bool done = parts > 1 ? state_.mixture.rings(circle, each)
+                                : state_.mixture.ring(this->belief(), circle, each);
+    if (!done) return Status::kNotPositiveDefinite;
+    state_.headings = 1;
     tidy();
-    this->rule_in_place().recovery.restart();
+    this->rule_in_place().recovery.forget();
     state_.accepted = 0;
     state_.bend = bend;
     return Status::kOk;
@@ -393,9 +422,10 @@ class GaussianSum : public Robust_ {
     if (!(belief.P(0, 0) + belief.P(1, 1) > noise)) return Scalar(0);
     const Scalar dx = belief.x(0) - circle.centre[0];
     const Scalar dy = belief.x(1) - circle.centre[1];
-    const Scalar range = sqrt(dx * dx + dy * dy);
-    const Scalar v = range > Scalar(0) ? variance_along(belief.P, -dy / range, dx / range)
-                                       : LongAxis<Scalar>(belief.P).variance;
+    const Scalar square = dx * dx + dy * dy;
+    const Scalar range = sqrt(square);
+    const Scalar v = square > Scalar(0) ? variance_along(belief.P, -dy, dx) / square
+                                        : LongAxis<Scalar>(belief.P).variance;
     // At least sigma: nearer than that v > 9 R is the stronger condition.
     const Scalar near = math::larger(circle.sigma, range < circle.radius ? range : circle.radius);
     const Scalar ratio = v / near;

@@ -53,6 +53,13 @@ class Robust : public Filter {
     return correction;
   }
 
+  /// kOk, kNotInitialised, or kRecoveriesRepeat: the recovery policy has widened the belief too
+  /// often, which says that a model is wrong.
+  Status status() const {
+    if (!this->initialised()) return Status::kNotInitialised;
+    return rule_.recovery.exhausted() ? Status::kRecoveriesRepeat : Status::kOk;
+  }
+
   Status check() const { return rule_check_ != Status::kOk ? rule_check_ : Filter::check(); }
   const Rule& rule() const { return rule_; }
 

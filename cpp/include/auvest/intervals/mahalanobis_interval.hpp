@@ -112,10 +112,16 @@ struct MahalanobisInterval {
     return m.interval;
   }
 
+  /// Parameters, and a memory that the law may have: one that is restored may be damaged.
   Status check() const {
     const Params& p = params;
+    const Memory& m = memory;
     const Scalar one = Scalar(1);
-    const bool valid = p.valid() && math::is_positive(p.tau_min) &&
+    const bool legal = math::is_positive(m.tau) && m.tau < one && math::is_positive(m.interval) &&
+                       math::within(m.ratio, Scalar(0), one) &&
+                       math::is_nonnegative(m.mahalanobis_squared) &&
+                       math::all_finite(m.last_estimate) && math::all_finite(m.last_reference);
+    const bool valid = legal && p.valid() && math::is_positive(p.tau_min) &&
                        math::within(p.tau0, p.tau_min, p.tau_max) && p.tau_max < one &&
                        math::within(p.scale, Scalar(0), one) && math::is_positive(p.epsilon) &&
                        math::is_positive(p.gamma1_m2) && math::is_positive(p.gamma2) &&

@@ -17,14 +17,16 @@
 #pragma once
 
 #include "auvest/math/basic.hpp"
+#include "auvest/math/resolution.hpp"
 #include "auvest/models/measurement_model.hpp"
+#include "auvest/models/range_limits.hpp"
 
 namespace auvest {
 inline namespace AUVEST_INSTRUCTIONS {
 
 /// Whatever the number of states.
 template <class Scalar>
-struct LeaderRangeParams {
+struct LeaderRangeParams : RangeLimits<Scalar> {
   Scalar leader_x_m = Scalar(0);
   Scalar leader_y_m = Scalar(0);
   Scalar sigma_range_m = Scalar(1);   ///< s_e of [MEKF 5]
@@ -37,6 +39,7 @@ struct LeaderRangeParams {
     v("leader_y_m", leader_y_m);
     v("sigma_range_m", sigma_range_m);
     v("sigma_leader_m", sigma_leader_m);
+    RangeLimits<Scalar>::visit(v);
   }
 };
 
@@ -136,6 +139,8 @@ struct LeaderRange : MeasurementModel<LeaderRange<Scalar_, N>, Scalar_, N, 1, 2>
     return noise;
   }
 
+  Status admits(const Measurement& z) const { return params.admits(z(0)); }
+
   void second_order(const Expansion& point, const Matrix<Scalar, 2, 2>& root,
                     Measurement& innovation, Noise& noise) const {
     const Scalar first = point.ux * root(1, 0) - point.uy * root(0, 0);  // L' n, n = (-uy, ux)
@@ -149,8 +154,12 @@ struct LeaderRange : MeasurementModel<LeaderRange<Scalar_, N>, Scalar_, N, 1, 2>
   Status check() const {
     const bool valid = math::is_finite(params.leader_x_m) && math::is_finite(params.leader_y_m) &&
                        math::is_positive(params.sigma_range_m) &&
-                       math::is_nonnegative(params.sigma_leader_m);
-    return valid ? Status::kOk : Status::kBadParameter;
+                       math::is_nonnegative(params.sigma_leader_m) && params.valid();
+    if (!valid) return Status::kBadParameter;
+    const Scalar variance = R()(0, 0);
+    const bool far = math::is_coarse(params.leader_x_m, variance) ||
+                     math::is_coarse(params.leader_y_m, variance);
+    return far ? Status::kFarFromOrigin : Status::kOk;
   }
 };
 

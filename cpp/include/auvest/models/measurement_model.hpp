@@ -7,7 +7,8 @@
 //     Vector<Scalar, M>           h(x)   the measurement without noise
 //     Matrix<Scalar, M, M>        R()    covariance of its noise
 //     Matrix<Scalar, M, Observed> H(x)   Jacobian of h (EKF only)
-//     Status                      check()  kOk, or kBadParameter if a parameter is out of range;
+//     Status                      check()  kOk, kBadParameter if a parameter is out of range, or
+//                                          kFarFromOrigin if a coordinate is (resolution.hpp);
 //                                          for who builds the model, once: an update does not ask
 //
 // It may override
@@ -15,6 +16,7 @@
 //     residual(z, predicted)      z - predicted, wrapped where a component is an angle
 //     about(x)                    an expansion with deviations in closed form
 //     kClosedForm                 true if it does
+//     admits(z)                   kOk, or why the sensor cannot have measured these finite numbers
 //     second_order(point, root, innovation, noise)
 //                                 for the EKF: takes the mean of the second-order term of h, over
 //                                 the belief with P_oo = root root', off the innovation and adds
@@ -86,6 +88,8 @@ struct MeasurementModel {
   }
 
   void place(const Scalar*) {}
+
+  Status admits(const Measurement&) const { return Status::kOk; }
 
   Measurement residual(const Measurement& z, const Measurement& predicted) const {
     Measurement difference;

@@ -24,6 +24,9 @@ struct PiecewiseAcceleration : ProcessModel<PiecewiseAcceleration<Scalar_>, Scal
 
   struct Params {
     Scalar acceleration_m_s2 = Scalar(1e-4);  ///< q, standard deviation of w per step
+    /// Power spectral density of a random walk of the position [m^2/s], which the paper has not:
+    /// with q = 0 and no velocity the master of which nothing is known but that it moves slowly.
+    Scalar position_psd = Scalar(0);
   };
 
   Params params;
@@ -42,7 +45,9 @@ struct PiecewiseAcceleration : ProcessModel<PiecewiseAcceleration<Scalar_>, Scal
   }
 
   Status check() const {
-    return math::is_nonnegative(params.acceleration_m_s2) ? Status::kOk : Status::kBadParameter;
+    const bool valid =
+        math::is_nonnegative(params.acceleration_m_s2) && math::is_nonnegative(params.position_psd);
+    return valid ? Status::kOk : Status::kBadParameter;
   }
 
  private:
@@ -59,6 +64,7 @@ struct PiecewiseAcceleration : ProcessModel<PiecewiseAcceleration<Scalar_>, Scal
                          dt * params.acceleration_m_s2, params.acceleration_m_s2};
     AUVEST_UNROLL
     for (int axis = 0; axis < 2; ++axis) {
+      p(axis, axis) = p(axis, axis) + params.position_psd * dt;
       AUVEST_UNROLL
       for (int i = 0; i < 3; ++i) {
         AUVEST_UNROLL

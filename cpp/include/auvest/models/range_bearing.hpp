@@ -25,8 +25,10 @@
 #pragma once
 
 #include "auvest/math/angle.hpp"
+#include "auvest/math/resolution.hpp"
 #include "auvest/math/trigonometry.hpp"
 #include "auvest/models/measurement_model.hpp"
+#include "auvest/models/range_limits.hpp"
 
 namespace auvest {
 inline namespace AUVEST_INSTRUCTIONS {
@@ -43,7 +45,7 @@ struct RangeBearing : MeasurementModel<RangeBearing<Scalar_, N>, Scalar_, N, 2, 
   static constexpr bool kClosedForm = true;
   static constexpr int kPlace = 2;
 
-  struct Params {
+  struct Params : RangeLimits<Scalar> {
     Scalar station_x_m = Scalar(0.2);         ///< b_x, Table 1
     Scalar station_y_m = Scalar(2);           ///< b_y, Table 1
     Scalar sigma_range_m = Scalar(0.05);      ///< standard deviation of v_r (not in the paper)
@@ -60,6 +62,7 @@ struct RangeBearing : MeasurementModel<RangeBearing<Scalar_, N>, Scalar_, N, 2, 
       v("sigma_range_m", sigma_range_m);
       v("sigma_bearing_rad", sigma_bearing_rad);
       v("near_field", near_field);
+      RangeLimits<Scalar>::visit(v);
     }
   };
 
@@ -174,6 +177,8 @@ struct RangeBearing : MeasurementModel<RangeBearing<Scalar_, N>, Scalar_, N, 2, 
     return difference;
   }
 
+  Status admits(const Measurement& z) const { return params.admits(z(0)); }
+
   /// The bend of the range over a belief as wide as far: only where it is more than three sigma of
   /// the range, so that elsewhere the EKF is the textbook's. Without it the range claims to know
   /// the position along the line of sight to centimetres and its variance across it, of kilometres,
@@ -203,8 +208,12 @@ struct RangeBearing : MeasurementModel<RangeBearing<Scalar_, N>, Scalar_, N, 2, 
     const bool valid = math::is_finite(params.station_x_m) && math::is_finite(params.station_y_m) &&
                        math::is_positive(params.sigma_range_m) &&
                        math::is_positive(params.sigma_bearing_rad) &&
-                       math::is_nonnegative(params.near_field);
-    return valid ? Status::kOk : Status::kBadParameter;
+                       math::is_nonnegative(params.near_field) && params.valid();
+    if (!valid) return Status::kBadParameter;
+    const Scalar variance = params.sigma_range_m * params.sigma_range_m;
+    const bool far = math::is_coarse(params.station_x_m, variance) ||
+                     math::is_coarse(params.station_y_m, variance);
+    return far ? Status::kFarFromOrigin : Status::kOk;
   }
 
  private:

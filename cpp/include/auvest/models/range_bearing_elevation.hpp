@@ -46,15 +46,17 @@
 #pragma once
 
 #include "auvest/math/angle.hpp"
+#include "auvest/math/resolution.hpp"
 #include "auvest/math/trigonometry.hpp"
 #include "auvest/models/measurement_model.hpp"
+#include "auvest/models/range_limits.hpp"
 
 namespace auvest {
 inline namespace AUVEST_INSTRUCTIONS {
 
 /// Whatever the number of states.
 template <class Scalar>
-struct RangeBearingElevationParams {
+struct RangeBearingElevationParams : RangeLimits<Scalar> {
   Scalar station_x_m = Scalar(0);
   Scalar station_y_m = Scalar(0);
   Scalar station_z_m = Scalar(0);
@@ -75,6 +77,7 @@ struct RangeBearingElevationParams {
     v("sigma_bearing_rad", sigma_bearing_rad);
     v("sigma_elevation_rad", sigma_elevation_rad);
     v("near_field", near_field);
+    RangeLimits<Scalar>::visit(v);
   }
 };
 
@@ -223,6 +226,8 @@ struct RangeBearingElevation
     return difference;
   }
 
+  Status admits(const Measurement& z) const { return params.admits(z(0)); }
+
   /// As RangeBearing's: the bend of the range, where it is more than three sigma of it. Its
   /// variance is that of a belief which is wide in one direction across the line of sight; it is
   /// less in two.
@@ -254,12 +259,18 @@ struct RangeBearingElevation
   }
 
   Status check() const {
-    const bool valid =
-        math::is_finite(params.station_x_m) && math::is_finite(params.station_y_m) &&
-        math::is_finite(params.station_z_m) && math::is_positive(params.sigma_range_m) &&
-        math::is_positive(params.sigma_bearing_rad) &&
-        math::is_positive(params.sigma_elevation_rad) && math::is_nonnegative(params.near_field);
-    return valid ? Status::kOk : Status::kBadParameter;
+    const bool valid = math::is_finite(params.station_x_m) && math::is_finite(params.station_y_m) &&
+                       math::is_finite(params.station_z_m) &&
+                       math::is_positive(params.sigma_range_m) &&
+                       math::is_positive(params.sigma_bearing_rad) &&
+                       math::is_positive(params.sigma_elevation_rad) &&
+                       math::is_nonnegative(params.near_field) && params.valid();
+    if (!valid) return Status::kBadParameter;
+    const Scalar variance = params.sigma_range_m * params.sigma_range_m;
+    const bool far = math::is_coarse(params.station_x_m, variance) ||
+                     math::is_coarse(params.station_y_m, variance) ||
+                     math::is_coarse(params.station_z_m, variance);
+    return far ? Status::kFarFromOrigin : Status::kOk;
   }
 
  private:

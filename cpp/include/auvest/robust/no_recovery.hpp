@@ -3,8 +3,11 @@
 // A recovery policy is a plain struct that offers
 //
 //     void   restart()                          forget the past
+//     void   forget()                           forget what was rejected: the belief has been
+//                                               replaced
 //     bool   after(correction, a, root, belief) told of every update; may widen the belief, and
 //                                               says whether it did. H = A L^-1 (A: `a`, L: `root`)
+//     bool   exhausted() const                  true while it would widen but has done so too often
 //     Status check() const                      kOk, or kBadParameter if a parameter is out of
 //     range
 #pragma once
@@ -22,12 +25,15 @@ struct NoRecovery {
   explicit NoRecovery(const Params& = Params()) {}
 
   void restart() {}
+  void forget() {}
 
   template <int M, int O, int N>
   bool after(const RobustCorrection<Scalar, M>&, const Matrix<Scalar, M, O>&,
              const Matrix<Scalar, O, O>&, Belief<Scalar, N>&) {
     return false;
   }
+
+  bool exhausted() const { return false; }
 
   Status check() const { return Status::kOk; }
 };

@@ -28,6 +28,13 @@
 // stand at one sigma. The measurement that completes the streak stays rejected: where the streak
 // was outliers by chance, the next good measurement finds a wide belief and puts it right, and
 // nothing but the prior's knowledge is lost.
+//
+// A belief that is wrong is put right by one widening, or a few. Where they repeat, the model is
+// wrong and not the belief: a scale of the ranges, a leader that is not where it says. A belief
+// that is widened again and again then follows every measurement, outliers too, and is worse than
+// one without a kernel. So widenings are counted and, like water from a bucket, the count runs out:
+// five at once, and then one in fifty measurements. Beyond that the belief stays as it is, and the
+// status of the filter says kRecoveriesRepeat.
 #pragma once
 
 #include <cstdint>
@@ -47,13 +54,22 @@ struct RejectionStreak {
 
   Params params;
   std::uint8_t count;           ///< 0..4 n
+  std::uint8_t widened;         ///< what the widenings have added to the bucket, less what ran out
   Scalar variance;              ///< v as the rejections so far ask for it [m^2], 0 if count is
   Matrix<Scalar, 2, 3> recent;  ///< h and innovation of rejections along the last two lines
 
   explicit RejectionStreak(const Params& p = Params()) : params(p) { restart(); }
 
+  /// What was rejected speaks against a belief that is gone.
+  void forget() {
+    count = 0;
+    variance = Scalar(0);
+    math::set_zero(recent);
+  }
+
   void restart() {
     count = 0;
+    widened = 0;
     variance = Scalar(0);
     math::set_zero(recent);
   }
@@ -62,6 +78,7 @@ struct RejectionStreak {
   template <int M, int O, int N>
   bool after(const RobustCorrection<Scalar, M>& correction, const Matrix<Scalar, M, O>& a,
              const Matrix<Scalar, O, O>& root, Belief<Scalar, N>& belief) {
+    if (widened > 0) --widened;
     int evidence = 0;
     int rejected = 0;
     for (int m = 0; m < M; ++m) {
@@ -78,11 +95,15 @@ struct RejectionStreak {
     }
     const int limit = kRejected * params.rejections;
     count = static_cast<std::uint8_t>(count + evidence < limit ? count + evidence : limit);
-    if (count < limit) return false;
+    if (count < limit || exhausted()) return false;
+    widened = static_cast<std::uint8_t>(widened + kWidening);
     for (int i = 0; i < (O < 2 ? O : 2); ++i) belief.P(i, i) = belief.P(i, i) + variance;
     variance = Scalar(0);
     return true;
   }
+
+  /// True while the belief has been widened so often that it is not any more.
+  bool exhausted() const { return widened > 255 - kWidening; }
 
   Status check() const {
     const bool valid = params.rejections >= 1 && params.rejections <= 60 &&
@@ -97,6 +118,8 @@ struct RejectionStreak {
   static constexpr int kRepeated = 7;
   static constexpr int kContradicted = 1;
   static constexpr int kAccepted = 2;  // against it
+
+  static constexpr int kWidening = 50;  // measurements, of the 255 that the bucket holds
 
   /// What the rejection of a component says, and how far off it says the position is. `before`:
   /// components of the same measurement that were rejected before it; they cannot repeat each

@@ -14,12 +14,15 @@ struct AnyRecovery {
   RejectionStreak<Scalar> streak;
 
   void restart() { streak.restart(); }
+  void forget() { streak.forget(); }
 
   template <int M, int O, int N>
   bool after(const RobustCorrection<Scalar, M>& correction, const Matrix<Scalar, M, O>& a,
              const Matrix<Scalar, O, O>& root, Belief<Scalar, N>& belief) {
     return enabled && streak.after(correction, a, root, belief);
   }
+
+  bool exhausted() const { return enabled && streak.exhausted(); }
 
   Status check() const { return streak.check(); }
 };

@@ -79,6 +79,22 @@ AUVEST_INLINE math::Mask<Value> is_master(const Value& chosen, int n) {
   return chosen > Value(Scalar(n) - Scalar(0.5)) && chosen < Value(Scalar(n) + Scalar(0.5));
 }
 
+/// The place where an echo z comes from that is heard at `pose`.
+template <class Scalar, class Value, int Pose>
+AUVEST_INLINE Vector<Value, 2> place_of(const Sonar<Scalar>& sonar, const Vector<Scalar, 2>& z,
+                                        const Vector<Value, Pose>& pose) {
+  using math::sincos;
+  const Scalar range = sonar.params.bearing == Bearing::kMasterToSlave ? -z(0) : z(0);
+  Value direction(z(1));
+  if (sonar.params.bearing == Bearing::kFromHeading) direction = direction + pose(Pose - 1);
+  Value sine, cosine;
+  sincos(direction, sine, cosine);
+  Vector<Value, 2> place;
+  place(0) = pose(0) + range * cosine;
+  place(1) = pose(1) + range * sine;
+  return place;
+}
+
 /// The belief of a master that is born where an echo z comes from, heard at `pose`: the covariance
 /// of range and bearing there, for an `uncertain` pose plus the pose's; velocity and acceleration
 /// zero with the given variances.

@@ -23,16 +23,20 @@ class DeadReckoning : public SlatFilter<Motion_, 0> {
   using typename Frame::SlaveBelief;
   using typename Frame::VelocityChange;
 
-  explicit DeadReckoning(const Motion& motion) : motion_(motion) {
+  /// longest_step_s: see EchoParams.
+  explicit DeadReckoning(const Motion& motion, Scalar longest_step_s = Scalar(3600))
+      : motion_(motion), longest_step_s_(longest_step_s) {
     math::set_zero(pose_.x);
     math::set_zero(pose_.P);
   }
 
   Status reset(const SlaveBelief& pose, math::Random&) {
-    if (motion_.check() != Status::kOk) return Status::kBadParameter;
-    const Status status = Frame::check_slave(pose);
+    if (motion_.check() != Status::kOk || !(longest_step_s_ > Scalar(0))) {
+      return Status::kBadParameter;
+    }
+    const Status status = check_slave(pose);
     if (status != Status::kOk) return status;
-    this->start();
+    this->start(Frame::noise_of_an_hour(motion_, NoMaster()));
     pose_ = pose;
     return Status::kOk;
   }
@@ -41,7 +45,8 @@ class DeadReckoning : public SlatFilter<Motion_, 0> {
   Status add_master(const MasterBelief&) { return Status::kOk; }
 
   Status predict(Scalar dt, const Control& u, math::Random&, const VelocityChange* = nullptr) {
-    const Status status = this->check_prediction(dt, u, nullptr);
+    const Status status =
+        this->check_prediction(dt, u, nullptr, longest_step_s_, Frame::extent_of(pose_));
     if (status != Status::kOk) return status;
     motion_.propagate(motion_.step(u, dt), pose_);
     return Status::kOk;
@@ -64,8 +69,15 @@ class DeadReckoning : public SlatFilter<Motion_, 0> {
     visit(self.pose_);
   }
 
+  Scalar longest_step_s() const { return longest_step_s_; }
+
  private:
+  struct NoMaster {
+    void propagate(MasterBelief&, Scalar) const {}
+  };
+
   Motion motion_;
+  Scalar longest_step_s_;
   SlaveBelief pose_;
 };
 

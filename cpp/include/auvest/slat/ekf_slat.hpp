@@ -9,6 +9,7 @@
 #include "auvest/math/random.hpp"
 #include "auvest/slat/echo.hpp"
 #include "auvest/slat/joint_gaussian.hpp"
+#include "auvest/slat/safeguards.hpp"
 #include "auvest/slat/slat_filter.hpp"
 #include "auvest/status.hpp"
 #include "auvest/types.hpp"
@@ -16,10 +17,18 @@
 namespace auvest {
 inline namespace AUVEST_INSTRUCTIONS {
 
-template <class Motion_, class Master_, int Masters>
-class EkfSlat : public SlatFilter<Motion_, Masters> {
+template <class Scalar>
+struct EkfSlatParams : EchoParams<Scalar> {
+  /// The slave is considered, not estimated (Schmidt-Kalman): echoes tell of the masters, with all
+  /// that is not known of the slave, and never correct it.
+  bool consider = false;
+};
+
+template <class Motion_, class Master_, int Masters,
+          class Safeguards_ = Safeguards<typename Motion_::Scalar, Masters>>
+class EkfSlat : public SlatFilter<Motion_, Masters, Safeguards_> {
  public:
-  using Frame = SlatFilter<Motion_, Masters>;
+  using Frame = SlatFilter<Motion_, Masters, Safeguards_>;
   using Motion = Motion_;
   using Master = Master_;
   using Model = JointGaussian<Motion, Master, Masters>;
@@ -32,10 +41,7 @@ class EkfSlat : public SlatFilter<Motion_, Masters> {
   static constexpr int kPose = Model::kPose;
   static constexpr int kStates = Model::kStates;
 
-  struct Params {
-    /// An echo whose NIS (2 degrees of freedom) exceeds this says nothing; 0: no gate.
-    Scalar gate = Scalar(0);
-  };
+  using Params = EkfSlatParams<Scalar>;
 
   EkfSlat(const Motion& motion, const Master& master, const Params& params = Params())
       : model_(motion, master), params_(params) {
@@ -45,12 +51,10 @@ class EkfSlat : public SlatFilter<Motion_, Masters> {
 
   /// There is no master yet.
   Status reset(const SlaveBelief& pose, math::Random&) {
-    if (model_.check() != Status::kOk || !math::is_nonnegative(params_.gate)) {
-      return Status::kBadParameter;
-    }
-    const Status status = Frame::check_slave(pose);
+    if (model_.check() != Status::kOk || !params_.valid()) return Status::kBadParameter;
+    const Status status = check_slave(pose);
     if (status != Status::kOk) return status;
-    this->start();
+    this->start(Frame::noise_of_an_hour(model_.motion, model_.master[0]));
     Model::start(pose, belief_);
     nis_ = Scalar(0);
     return Status::kOk;
@@ -60,41 +64,69 @@ class EkfSlat : public SlatFilter<Motion_, Masters> {
     const Status status = this->check_master(belief);
     if (status != Status::kOk) return status;
     Model::put(belief, Model::first_of(masters_), belief_);
+    safeguards_.begin(masters_);
     ++masters_;
     return Status::kOk;
   }
 
   Status predict(Scalar dt, const Control& u, math::Random&,
                  const VelocityChange* changes = nullptr) {
-    const Status status = this->check_prediction(dt, u, changes);
+    const Status status =
+        this->check_prediction(dt, u, changes, params_.longest_step_s, Frame::extent_of(belief_));
     if (status != Status::kOk) return status;
+    safeguards_.wait(dt, masters_);
     model_.predict(model_.motion.step(u, dt), dt, changes, masters_, belief_);
     return Status::kOk;
   }
 
   /// Updates by what the sonar heard at one time: any number of masters, each at most once. Echoes
   /// of kUnknownMaster are those of the masters that make all echoes together the likeliest.
+  /// An echo of a master that is lost or was silent for too long is its rebirth (safeguards.hpp).
   /// kOverflow: the belief would not be finite.
   Status update(const Echo<Scalar>* echoes, int count, const Sonar<Scalar>& sonar, math::Random&) {
     const Status status = this->check_update(echoes, count, masters_, sonar);
     if (status != Status::kOk || count == 0) return status;
     BeliefType belief = belief_;
+    Safeguards_ safeguards = safeguards_;
     Scalar nis = Scalar(0);
     Scalar log_likelihood = log_likelihood_;
     int who[Masters];
     Model::identify(belief, echoes, count, masters_, sonar, params_.gate, who);
-    for (int s = 0; s < count; ++s) {
+    bool reborn[Masters];                             // after all others have told of the slave
+    for (int s = 0; s < count && s < Masters; ++s) {  // count <= Masters
+      const int known = echoes[s].master;
+      reborn[s] = known != kUnknownMaster && safeguards.forgotten(known, params_);
+      if (reborn[s]) continue;
       Score<Scalar> score;
+      const SlaveBelief slave = Model::template part<kPose>(belief, 0);
       if (!Model::correct(echoes[s].z, who[s], sonar, params_.gate, belief, score))
         return Status::kOverflow;
+      // With the gain of the slave zero its covariances with the masters are those of the optimal
+      // gain, and so is all else but the slave's own part.
+      if (params_.consider) Model::put(slave, 0, belief);
       nis = nis + score.nis;
       log_likelihood = log_likelihood + score.log_density - Frame::density_constant();
+      if (known == kUnknownMaster) continue;
+      if (!(params_.gate > Scalar(0) && score.nis > params_.gate)) {
+        safeguards.accepted(known);
+      } else {
+        reborn[s] = safeguards.refused(known, place_of(sonar, echoes[s].z, slave.x), echoes[s].z(0),
+                                       sonar.params, params_);
+      }
+    }
+    for (int s = 0; s < count && s < Masters; ++s) {
+      if (!reborn[s]) continue;
+      Model::give_rebirth(echoes[s].z, echoes[s].master, sonar, params_, belief);
+      safeguards.reborn(echoes[s].master);
     }
     belief_ = belief;
     nis_ = nis;
     log_likelihood_ = log_likelihood;
+    safeguards_ = safeguards;
     return Status::kOk;
   }
+
+  Scalar longest_step_s() const { return params_.longest_step_s; }
 
   SlaveBelief slave() const { return Model::template part<kPose>(belief_, 0); }
   MasterBelief master(int n) const { return Model::template part<6>(belief_, Model::first_of(n)); }
@@ -114,6 +146,7 @@ class EkfSlat : public SlatFilter<Motion_, Masters> {
  private:
   using Frame::log_likelihood_;
   using Frame::masters_;
+  using Frame::safeguards_;
 
   Model model_;
   Params params_;

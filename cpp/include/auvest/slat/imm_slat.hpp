@@ -23,6 +23,22 @@
 namespace auvest {
 inline namespace AUVEST_INSTRUCTIONS {
 
+/// That of the noisiest model.
+template <class... Models>
+struct NoiseOf<Imm<Models...>> {
+  const Imm<Models...>& master;
+
+  template <class Belief, class Scalar>
+  void propagate(Belief& zero, Scalar dt) const {
+    const Belief none = zero;
+    for (int k = 0; k < Imm<Models...>::kModes; ++k) {
+      Belief one = none;
+      master.models.propagate(k, one, dt);
+      for (int i = 0; i < 6; ++i) zero.P(i, i) = math::larger(zero.P(i, i), one.P(i, i));
+    }
+  }
+};
+
 /// Corrects the belief stored from `at` on by `ekf`, in the lanes of `only` (null: all) where that
 /// is valid; gives that belief and returns the logarithm of the echo's density.
 template <class Lanes, class Value, class Ekf>
@@ -136,19 +152,20 @@ constexpr int power(int base, int exponent) {
   return exponent == 0 ? 1 : base * power(base, exponent - 1);
 }
 
-template <class Motion_, class... Models, int Masters>
-class EkfSlat<Motion_, Imm<Models...>, Masters> : public SlatFilter<Motion_, Masters> {
+template <class Motion_, class... Models, int Masters, class Safeguards_>
+class EkfSlat<Motion_, Imm<Models...>, Masters, Safeguards_>
+    : public SlatFilter<Motion_, Masters, Safeguards_> {
  public:
-  using Frame = SlatFilter<Motion_, Masters>;
+  using Frame = SlatFilter<Motion_, Masters, Safeguards_>;
   using Motion = Motion_;
   using Master = Imm<Models...>;
   using Model = JointGaussian<Motion, typename Master::Model, Masters>;
-  using Params = typename EkfSlat<Motion, typename Master::Model, Masters>::Params;
   using typename Frame::Control;
   using typename Frame::MasterBelief;
   using typename Frame::Scalar;
   using typename Frame::SlaveBelief;
   using typename Frame::VelocityChange;
+  using Params = EkfSlatParams<Scalar>;
   using BeliefType = typename Model::Joint;
   static constexpr int kPose = Model::kPose;
   static constexpr int kStates = Model::kStates;
@@ -166,13 +183,12 @@ class EkfSlat<Motion_, Imm<Models...>, Masters> : public SlatFilter<Motion_, Mas
   }
 
   Status reset(const SlaveBelief& pose, math::Random&) {
-    if (motion_.check() != Status::kOk || master_.check() != Status::kOk ||
-        !math::is_nonnegative(params_.gate)) {
+    if (motion_.check() != Status::kOk || master_.check() != Status::kOk || !params_.valid()) {
       return Status::kBadParameter;
     }
-    const Status status = Frame::check_slave(pose);
+    const Status status = check_slave(pose);
     if (status != Status::kOk) return status;
-    this->start();
+    this->start(Frame::noise_of_an_hour(motion_, master_));
     Model::start(pose, belief_[0]);
     for (int h = 0; h < kHypotheses; ++h) log_weight_(h) = no_log_weight<Scalar>();
     log_weight_(0) = Scalar(0);
@@ -194,14 +210,18 @@ class EkfSlat<Motion_, Imm<Models...>, Masters> : public SlatFilter<Motion_, Mas
       log_weight_(h) = log_weight_(origin) + master_.log_share(h / hypotheses_);
     }
     hypotheses_ = kModes * hypotheses_;
+    safeguards_.begin(masters_);
     ++masters_;
     return Status::kOk;
   }
 
   Status predict(Scalar dt, const Control& u, math::Random&,
                  const VelocityChange* changes = nullptr) {
-    const Status status = this->check_prediction(dt, u, changes);
+    Extent<Scalar> extent;
+    for (int h = 0; h < hypotheses_; ++h) Frame::extend(belief_[h], 0, extent);
+    const Status status = this->check_prediction(dt, u, changes, params_.longest_step_s, extent);
     if (status != Status::kOk) return status;
+    safeguards_.wait(dt, masters_);
     for (int n = 0; n < masters_; ++n) mix_models_of(n, master_.stay(dt));
     const typename Motion::Step step = motion_.step(u, dt);
     Model model(motion_, master_.model(0));
@@ -218,26 +238,26 @@ class EkfSlat<Motion_, Imm<Models...>, Masters> : public SlatFilter<Motion_, Mas
   Status update(const Echo<Scalar>* echoes, int count, const Sonar<Scalar>& sonar, math::Random&) {
     const Status status = this->check_update(echoes, count, masters_, sonar);
     if (status != Status::kOk || count == 0) return status;
-    bool heard = false;
-    Scalar nis(0);
-    Weights part;
-    log_sum(log_weight_, part);
-    Weights log_weight = log_weight_;
-    for (int h = 0; h < hypotheses_; ++h) {
-      Score<Scalar> score;
-      if (correct(echoes, count, sonar, belief_[h], score)) {
-        heard = true;
-        nis = nis + part(h) * score.nis;
-        log_weight(h) = math::larger(no_log_weight<Scalar>(), log_weight(h) + score.log_density);
-      } else {
-        log_weight(h) = no_log_weight<Scalar>();
+    Echo<Scalar> heard[Masters];  // those that are not the rebirth of a forgotten master
+    int left = 0;
+    for (int s = 0; s < count; ++s) {
+      if (!is_forgotten(echoes[s])) heard[left++] = echoes[s];
+    }
+    Scalar refused[Masters];
+    if (left > 0 && !correct(heard, left, sonar, refused)) return Status::kOverflow;
+    for (int s = 0; s < count; ++s) {
+      if (is_forgotten(echoes[s])) rebirth(echoes[s], sonar);
+    }
+    for (int s = 0; s < left; ++s) {
+      const int known = heard[s].master;
+      if (known == kUnknownMaster) continue;
+      if (!(refused[s] > Scalar(0.5))) {
+        safeguards_.accepted(known);
+      } else if (safeguards_.refused(known, place_of(sonar, heard[s].z, slave().x), heard[s].z(0),
+                                     sonar.params, params_)) {
+        rebirth(heard[s], sonar);
       }
     }
-    if (!heard) return Status::kOverflow;
-    log_likelihood_ =
-        log_likelihood_ + normalise(log_weight) - Scalar(count) * Frame::density_constant();
-    log_weight_ = log_weight;
-    nis_ = nis;
     return Status::kOk;
   }
 
@@ -274,6 +294,8 @@ class EkfSlat<Motion_, Imm<Models...>, Masters> : public SlatFilter<Motion_, Mas
 
   Scalar nis() const { return nis_; }  ///< of the last update: mean over the hypotheses before it
 
+  Scalar longest_step_s() const { return params_.longest_step_s; }
+
   /// As SlatFilter::visit_state.
   template <class Self, class Visit>
   static void visit_state(Self& self, Visit& visit) {
@@ -288,22 +310,72 @@ class EkfSlat<Motion_, Imm<Models...>, Masters> : public SlatFilter<Motion_, Mas
   using Weights = Vector<Scalar, kHypotheses>;
   using Frame::log_likelihood_;
   using Frame::masters_;
+  using Frame::safeguards_;
+
+  bool is_forgotten(const Echo<Scalar>& echo) const {
+    return echo.master != kUnknownMaster && safeguards_.forgotten(echo.master, params_);
+  }
+
+  /// What the models knew of the master apart is forgotten, and so are their probabilities.
+  void rebirth(const Echo<Scalar>& echo, const Sonar<Scalar>& sonar) {
+    mix_models_of(echo.master, Scalar(0));
+    for (int h = 0; h < hypotheses_; ++h) {
+      Model::give_rebirth(echo.z, echo.master, sonar, params_, belief_[h]);
+    }
+    safeguards_.reborn(echo.master);
+  }
+
+  /// False, with nothing changed, where no hypothesis could follow. `refused`: the weight of the
+  /// hypotheses to which an echo lies beyond the gate.
+  bool correct(const Echo<Scalar>* echoes, int count, const Sonar<Scalar>& sonar,
+               Scalar (&refused)[Masters]) {
+    bool heard = false;
+    Scalar nis(0);
+    Weights part;
+    log_sum(log_weight_, part);
+    Weights log_weight = log_weight_;
+    for (Scalar& weight : refused) weight = Scalar(0);
+    for (int h = 0; h < hypotheses_; ++h) {
+      Score<Scalar> score;
+      Scalar each[Masters];
+      if (correct(echoes, count, sonar, belief_[h], score, each)) {
+        heard = true;
+        nis = nis + part(h) * score.nis;
+        log_weight(h) = math::larger(no_log_weight<Scalar>(), log_weight(h) + score.log_density);
+        for (int s = 0; s < count; ++s) {
+          const bool beyond = params_.gate > Scalar(0) && each[s] > params_.gate;
+          if (beyond) refused[s] = refused[s] + part(h);
+        }
+      } else {
+        log_weight(h) = no_log_weight<Scalar>();
+      }
+    }
+    if (!heard) return false;
+    log_likelihood_ =
+        log_likelihood_ + normalise(log_weight) - Scalar(count) * Frame::density_constant();
+    log_weight_ = log_weight;
+    nis_ = nis;
+    return true;
+  }
 
   static int mode_of(int hypothesis, int master) {
     return hypothesis / power(kModes, master) % kModes;
   }
 
   /// False, with `belief` as it was, where the result would not be finite. `score` is of all
-  /// echoes.
+  /// echoes, `nis` of each.
   bool correct(const Echo<Scalar>* echoes, int count, const Sonar<Scalar>& sonar,
-               BeliefType& belief, Score<Scalar>& score) const {
+               BeliefType& belief, Score<Scalar>& score, Scalar (&nis)[Masters]) const {
     BeliefType moved = belief;
     int who[Masters];
     Model::identify(moved, echoes, count, masters_, sonar, params_.gate, who);
     score.nis = score.log_density = Scalar(0);
     for (int s = 0; s < count; ++s) {
       Score<Scalar> one;
+      const SlaveBelief slave = Model::template part<kPose>(moved, 0);
       if (!Model::correct(echoes[s].z, who[s], sonar, params_.gate, moved, one)) return false;
+      if (params_.consider) Model::put(slave, 0, moved);
+      nis[s] = one.nis;
       score.nis = score.nis + one.nis;
       score.log_density = score.log_density + one.log_density;
     }

@@ -12,8 +12,10 @@
 #include "auvest/models/sonar.hpp"
 #include "auvest/particles/log_weights.hpp"
 #include "auvest/slat/association.hpp"
+#include "auvest/slat/definite.hpp"
 #include "auvest/slat/echo.hpp"
 #include "auvest/slat/likelihood.hpp"
+#include "auvest/slat/safeguards.hpp"
 #include "auvest/types.hpp"
 
 namespace auvest {
@@ -117,9 +119,86 @@ struct JointGaussian {
     score.nis = posterior.nis;
     if (gate > Scalar(0)) saturate(gate, posterior);
     score.log_density = log_density(valid, posterior, noise);
-    if (!valid || !move_belief(ordered, root, slope, posterior)) return false;
-    put_back(ordered, n, joint);
-    return true;
+    return valid && move(root, slope, posterior, n, ordered, joint);
+  }
+
+  /// What an echo of master n that a share `accepted` in (0, 1] of a set takes in makes of the
+  /// set's covariance: P <- P - (2 g - g^2) P H' S^-1 H P with g = accepted, which is
+  /// (I - K H) P (I - K H)' + K R K' with the gain K = g P H' S^-1. The mean stays.
+  ///
+  /// That is the update by a measurement with the noise R / c + (1 / c - 1) H P H', c = 2 g - g^2,
+  /// and as such a square.
+  static void narrow(int n, const Sonar<Scalar>& sonar, Scalar accepted, Joint& joint) {
+    Joint ordered;
+    Matrix<Scalar, kObserved, kObserved> root;
+    Slope slope;
+    factor(joint, n, ordered, root, slope);
+    Matrix<Scalar, 2, kObserved> a;
+    Vector<Scalar, 2> nothing;
+    Vector<Scalar, 2> innovation;
+    math::set_zero(nothing);
+    look(ordered, root, nothing, sonar, a, innovation);
+    math::set_zero(innovation);
+    Matrix<Scalar, 2, 2> noise = sonar.template R<Scalar>();
+    if (accepted < Scalar(1)) {
+      const Scalar c = accepted * (Scalar(2) - accepted);
+      Matrix<Scalar, 2, 2> s;
+      innovation_covariance(a, noise, s);
+      for (int i = 0; i < 2; ++i) {
+        for (int j = 0; j <= i; ++j) noise(i, j) = s(i, j) / c - (s(i, j) - noise(i, j));
+      }
+      if (!math::ldlt(noise)) return;  // c is so small that nothing would come of it
+    }
+    Posterior<Scalar, kObserved> posterior;
+    if (potter(a, noise, innovation, posterior)) move(root, slope, posterior, n, ordered, joint);
+  }
+
+  /// Master n is born where an echo z comes from: the covariance of range and bearing there plus
+  /// G P_s G', with G the Jacobian of that place by the pose, and the covariances G P_s with the
+  /// pose and G P_sj with the other masters, without which the next echo would harm the slave.
+  /// Velocity and acceleration: zero with their variances of a rebirth. The slave stays as it
+  /// is.
+  static AUVEST_COLD void give_rebirth(const Vector<Scalar, 2>& z, int n,
+                                       const Sonar<Scalar>& sonar, const EchoParams<Scalar>& params,
+                                       Joint& joint) {
+    const SlaveBelief pose = part<kPose>(joint, 0);
+    MasterBelief born;
+    give_birth(sonar, z, pose, false, params.rebirth_velocity_variance(),
+               params.rebirth_acceleration_variance(), born);
+    Matrix<Scalar, 2, kPose> g;
+    jacobian_of_place(sonar, born.x(0) - pose.x(0), born.x(1) - pose.x(1), g);
+    const int first = first_of(n);
+    Matrix<Scalar, 2, kPose> by_pose;  // G P_s
+    for (int i = 0; i < 2; ++i) {
+      for (int j = 0; j < kPose; ++j) by_pose(i, j) = math::dot(&g(i, 0), &pose.P(j, 0), kPose);
+    }
+    for (int i = 0; i < 2; ++i) {
+      for (int j = 0; j <= i; ++j) {
+        born.P(i, j) = math::plus_dot(born.P(i, j), &by_pose(i, 0), &g(j, 0), kPose);
+      }
+    }
+    for (int j = 0; j < kStates; ++j) {  // with all but itself
+      if (j >= first && j < first + 6) continue;
+      Vector<Scalar, kPose> with_pose;
+      for (int k = 0; k < kPose; ++k) with_pose(k) = j > k ? joint.P(j, k) : joint.P(k, j);
+      for (int i = 0; i < 6; ++i) {
+        const Scalar covariance = i < 2 ? math::dot(&g(i, 0), with_pose.data(), kPose) : Scalar(0);
+        (j > first ? joint.P(j, first + i) : joint.P(first + i, j)) = covariance;
+      }
+    }
+    put(born, first, joint);
+  }
+
+  /// The Jacobian of the place where an echo comes from, (dx, dy) from the slave, by the pose.
+  template <class Value>
+  static AUVEST_INLINE void jacobian_of_place(const Sonar<Scalar>& sonar, const Value& dx,
+                                              const Value& dy, Matrix<Value, 2, kPose>& g) {
+    math::set_zero(g);
+    g(0, 0) = g(1, 1) = Value(1);
+    if (sonar.params.bearing == Bearing::kFromHeading) {
+      g(0, kPose - 1) = -dy;
+      g(1, kPose - 1) = dx;
+    }
   }
 
   /// Whose echoes they are. Unknown ones are those of the masters that make all echoes of the ping
@@ -167,9 +246,7 @@ struct JointGaussian {
       if (k == 0) noise(1, 0) = certain ? Scalar(0) : spread(1, 0) / spread(0, 0);
     }
     Posterior<Scalar, kObserved> posterior;
-    if (potter(a, noise, innovation, posterior) && move_belief(ordered, root, slope, posterior)) {
-      put_back(ordered, n, joint);
-    }
+    if (potter(a, noise, innovation, posterior)) move(root, slope, posterior, n, ordered, joint);
   }
 
  private:
@@ -225,6 +302,23 @@ struct JointGaussian {
         joint.P(row + i, column + j) = math::dot(&half(i, 0), &by_column(j, 0), Columns);
       }
     }
+  }
+
+  /// Moves `ordered` to the posterior, and `joint` with it where it is finite.
+  static bool move(Matrix<Scalar, kObserved, kObserved>& root, const Slope& slope,
+                   const Posterior<Scalar, kObserved>& posterior, int n, Joint& ordered,
+                   Joint& joint) {
+    const auto before = unseen_variances<kObserved>(ordered.P);
+    const Scalar few = Scalar(1e4) * math::machine_epsilon<Scalar>();
+    bool faint = false;  // the master's place relative to the slave, beside their drift
+    for (int i = kPose; i < kObserved; ++i) {
+      faint = faint || root(i, i) * root(i, i) < few * ordered.P(i, i);
+    }
+    if (!move_belief(ordered, root, slope, posterior)) return false;
+    keep_definite<kObserved>(before, slope, ordered.P);
+    put_back(ordered, n, joint);
+    if (faint) raise_pivots(joint.P);
+    return true;
   }
 
   /// The place of state i when master n stands first among the masters: the update factors the

@@ -10,6 +10,7 @@
 #include "auvest/math/linear_algebra.hpp"
 #include "auvest/math/twin.hpp"
 #include "auvest/models/sonar.hpp"
+#include "auvest/slat/definite.hpp"
 #include "auvest/slat/likelihood.hpp"
 #include "auvest/types.hpp"
 
@@ -49,8 +50,10 @@ struct MasterEkf {
 
   /// [SLATF 25] and [SLATF 26]. False where the master cannot follow.
   AUVEST_INLINE math::Mask<Value> correct(Belief<Value, 6>& master) {
+    const Vector<Value, 4> before = unseen_variances<2>(master.P);
     // [SLATF 25] [SLATF 26]
     const math::Mask<Value> finite = move_belief(master, root, slope, posterior);
+    keep_definite<2>(before, slope, master.P);
     return finite && valid;
   }
 };

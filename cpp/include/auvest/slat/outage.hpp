@@ -12,6 +12,7 @@
 
 #include "auvest/math/random.hpp"
 #include "auvest/slat/echo.hpp"
+#include "auvest/slat/slat_filter.hpp"
 #include "auvest/status.hpp"
 #include "auvest/types.hpp"
 
@@ -45,8 +46,10 @@ class Outage {
 
   /// Takes over what communication brings, and ends an outage. `masters` holds `count` beliefs.
   Status share(const SlaveBelief& slave, const MasterBelief* masters, int count) {
-    if (count < 0 || count > Masters) return Status::kBadParameter;
-    if (!math::all_finite(slave.x) || !math::lower_finite(slave.P)) return Status::kNotFinite;
+    constexpr int kRoom = Filter::kMasters;
+    if (count < 0 || count > Masters || (kRoom > 0 && count > kRoom)) return Status::kBadParameter;
+    const Status status = check_slave(slave);
+    if (status != Status::kOk) return status;
     for (int n = 0; n < count; ++n) {
       if (!math::all_finite(masters[n].x) || !math::lower_finite(masters[n].P)) {
         return Status::kNotFinite;
@@ -60,19 +63,28 @@ class Outage {
     return Status::kOk;
   }
 
-  /// The first prediction after a shared state starts the filter from it.
+  /// The first prediction after a shared state starts the filter from it. One that is refused does
+  /// not.
   Status predict(Scalar dt, const Control& u, math::Random& random,
                  const VelocityChange* changes = nullptr) {
     if (mode_ == Communication::kNever) return Status::kNotInitialised;
-    if (mode_ == Communication::kUp) {
-      Status status = filter_.reset(slave_, random);
-      for (int n = 0; n < count_ && status == Status::kOk; ++n) {
-        status = filter_.add_master(masters_[n]);
-      }
-      if (status != Status::kOk) return status;
-      mode_ = Communication::kDown;
+    if (mode_ == Communication::kDown) return filter_.predict(dt, u, random, changes);
+    if (!math::is_finite(dt) || !math::all_finite(u)) return Status::kNotFinite;
+    if (dt < Scalar(0)) return Status::kTimeBackwards;
+    if (dt > filter_.longest_step_s()) return Status::kStepTooLong;
+    if (!plan_finite(changes, count_)) return Status::kNotFinite;
+    const math::Random before = random;
+    Status status = filter_.reset(slave_, random);
+    for (int n = 0; n < count_ && status == Status::kOk; ++n) {
+      status = filter_.add_master(masters_[n]);
     }
-    return filter_.predict(dt, u, random, changes);
+    if (status == Status::kOk) status = filter_.predict(dt, u, random, changes);
+    if (status == Status::kOk) {
+      mode_ = Communication::kDown;
+    } else {
+      random = before;
+    }
+    return status;
   }
 
   /// An echo counts only while the filter runs.

@@ -40,7 +40,8 @@ struct MeasurementProposal {
 
   /// Refines the proposal N(pose.x, root root') by an echo, [SLATF 51] of it in `view`, given its
   /// noise R and the root of the covariance of the master's position. Returns the logarithm of the
-  /// weight, without the constant. Beyond a NIS of `gate` the echo says nothing.
+  /// weight, without the constant. Beyond a NIS of `gate` the echo says nothing. `nis` is that
+  /// before the gate.
   ///
   /// Differs from [SLATF 57] and [SLATF 58], which need P_S^-1: with P_S = L L' and in the
   /// coordinates of L the same update needs no inverse, so P_S may be singular (zero speed, a
@@ -49,7 +50,8 @@ struct MeasurementProposal {
   template <class View, class Value, int Pose>
   static AUVEST_INLINE Value refine(const View& view, const Matrix<Value, 2, 2>& noise,
                                     const Matrix<Value, 2, 2>& master_root, const Value& gate,
-                                    Belief<Value, Pose>& pose, Matrix<Value, Pose, Pose>& root) {
+                                    Belief<Value, Pose>& pose, Matrix<Value, Pose, Pose>& root,
+                                    Value& nis) {
     using math::all;
     Matrix<Value, 2, 2> by_master;
     Matrix<Value, 2, 2> lambda;
@@ -66,6 +68,7 @@ struct MeasurementProposal {
     Posterior<Value, Pose> posterior;
     // [SLATF 65]: L = G_S P_S G_S' + Lambda, whose determinant stays in lambda
     math::Mask<Value> valid = potter(by_slave, lambda, view.innovation, posterior);
+    nis = posterior.nis;
     saturate(gate, posterior);
     valid = valid && move_belief(pose, root, no_others, posterior);  // [SLATF 57] [SLATF 58]
     if (!all(valid)) {

@@ -11,6 +11,8 @@
 // leaves the filter as it was.
 #pragma once
 
+#include <limits>
+
 #include "auvest/math/linear_algebra.hpp"
 #include "auvest/math/random.hpp"
 #include "auvest/models/sonar.hpp"
@@ -18,17 +20,53 @@
 #include "auvest/particles/particle_set.hpp"
 #include "auvest/particles/resampling.hpp"
 #include "auvest/slat/echo.hpp"
+#include "auvest/slat/safeguards.hpp"
 #include "auvest/status.hpp"
 #include "auvest/types.hpp"
 
 namespace auvest {
 inline namespace AUVEST_INSTRUCTIONS {
 
-/// Masters: how many there may be.
-template <class Motion_, int Masters>
+/// What a master's models add to a covariance of zero in dt seconds, at least on the diagonal.
+template <class Master>
+struct NoiseOf {
+  const Master& master;
+
+  template <class Belief, class Scalar>
+  void propagate(Belief& zero, Scalar dt) const {
+    master.propagate(zero, dt);
+  }
+};
+
+/// How large the numbers of slave and masters are: the squares of the largest position, velocity
+/// and acceleration, or variance of one.
+template <class Scalar>
+struct Extent {
+  Scalar square[3] = {Scalar(0), Scalar(0), Scalar(0)};
+};
+
+/// A belief of the slave to start from. Only the lower triangle of P is read; it may be singular or
+/// zero.
+template <class Scalar, int Pose>
+Status check_slave(const Belief<Scalar, Pose>& pose) {
+  if (!math::all_finite(pose)) return Status::kNotFinite;
+  for (int i = 0; i < Pose; ++i) {
+    if (pose.P(i, i) < Scalar(0)) return Status::kNotPositiveDefinite;
+    for (int j = 0; j < i; ++j) {
+      // A correlation of 1 may be a little more by rounding.
+      const Scalar most = Scalar(1.0001) * math::sqrt(pose.P(i, i)) * math::sqrt(pose.P(j, j));
+      if (math::absolute(pose.P(i, j)) > most) return Status::kNotPositiveDefinite;
+    }
+  }
+  return Status::kOk;
+}
+
+/// Masters: how many there may be. Safeguards_: see safeguards.hpp.
+template <class Motion_, int Masters, class Safeguards_ = NoSafeguards>
 class SlatFilter {
  public:
   using Motion = Motion_;
+  using Safeguards = Safeguards_;
   using Scalar = typename Motion::Scalar;
   using Control = typename Motion::Control;
   static constexpr int kPose = Motion::kStates;
@@ -39,6 +77,48 @@ class SlatFilter {
 
   int masters() const { return masters_; }
   Scalar log_likelihood() const { return log_likelihood_; }  ///< of all echoes since reset
+  /// Echoes refused and masters born again since reset.
+  const Safeguards& safeguards() const { return safeguards_; }
+
+  /// What predict() will say of its arguments in a filter with numbers of that extent. Does not ask
+  /// whether the filter has started.
+  static Status check_step(Scalar dt, const Control& u, const VelocityChange* changes, int masters,
+                           Scalar longest_step_s, const Extent<Scalar>& extent,
+                           Scalar hourly_noise) {
+    if (!math::is_finite(dt) || !math::all_finite(u)) return Status::kNotFinite;
+    if (dt < Scalar(0)) return Status::kTimeBackwards;
+    if (dt > longest_step_s) return Status::kStepTooLong;
+    if (!plan_finite(changes, masters)) return Status::kNotFinite;
+    Scalar speed = math::absolute(u(0));
+    for (int n = 0; changes != nullptr && n < masters; ++n) {
+      for (int axis = 0; axis < 2; ++axis) {
+        speed = math::larger(speed, math::absolute(changes[n](axis)));
+      }
+    }
+    bool moderate = dt <= Scalar(kHour) && speed <= Scalar(1e4) && hourly_noise <= Scalar(1e16);
+    for (const Scalar& square : extent.square) moderate = moderate && square <= Scalar(1e16);
+    return moderate || stays_finite(dt, speed, extent, hourly_noise) ? Status::kOk
+                                                                     : Status::kOverflow;
+  }
+
+  /// Takes into `extent` the N states of a belief, which are those of slave and masters from state
+  /// `first` on.
+  template <int N>
+  static void extend(const Belief<Scalar, N>& belief, int first, Extent<Scalar>& extent) {
+    for (int i = 0; i < N; ++i) {
+      const int state = first + i - kPose;
+      Scalar& most = extent.square[state < 0 ? 0 : state % 6 / 2];
+      const Scalar square = belief.x(i) * belief.x(i);
+      if (!(square <= most)) most = square;  // a NaN, too
+      if (!(belief.P(i, i) <= most)) most = belief.P(i, i);
+    }
+  }
+  template <int N>
+  static Extent<Scalar> extent_of(const Belief<Scalar, N>& belief) {
+    Extent<Scalar> extent;
+    extend(belief, 0, extent);
+    return extent;
+  }
 
   /// Hands all numbers of the state to `visit`, which keeps them, or overwrites them by those that
   /// were kept: to save a filter and to go on from there.
@@ -55,15 +135,6 @@ class SlatFilter {
   /// What the log density of an echo has beside that of log_density(): log(2 pi), for two numbers.
   static constexpr Scalar density_constant() { return Scalar(1.8378770664); }
 
-  /// A belief to start from. Only the lower triangle of P is read; it may be singular or zero.
-  static Status check_slave(const SlaveBelief& pose) {
-    if (!math::all_finite(pose)) return Status::kNotFinite;
-    for (int i = 0; i < kPose; ++i) {
-      if (pose.P(i, i) < Scalar(0)) return Status::kNotPositiveDefinite;
-    }
-    return Status::kOk;
-  }
-
   /// One more master.
   Status check_master(const MasterBelief& belief) const {
     if (!initialised_) return Status::kNotInitialised;
@@ -72,11 +143,29 @@ class SlatFilter {
     return math::is_positive_definite(belief.P) ? Status::kOk : Status::kNotPositiveDefinite;
   }
 
-  Status check_prediction(Scalar dt, const Control& u, const VelocityChange* changes) const {
+  Status check_prediction(Scalar dt, const Control& u, const VelocityChange* changes,
+                          Scalar longest_step_s, const Extent<Scalar>& extent) const {
     if (!initialised_) return Status::kNotInitialised;
-    if (!math::is_finite(dt) || !math::all_finite(u)) return Status::kNotFinite;
-    if (dt < Scalar(0)) return Status::kTimeBackwards;
-    return plan_finite(changes, masters_) ? Status::kOk : Status::kNotFinite;
+    return check_step(dt, u, changes, masters_, longest_step_s, extent, hourly_noise_);
+  }
+
+  /// The largest number that an hour of noise puts into a covariance, for check_step().
+  template <class Master>
+  static Scalar noise_of_an_hour(const Motion& motion, const Master& master) {
+    SlaveBelief pose;
+    MasterBelief landmark;
+    math::set_zero(pose.x);
+    math::set_zero(pose.P);
+    math::set_zero(landmark.x);
+    math::set_zero(landmark.P);
+    Control u;
+    u(0) = u(1) = Scalar(1);
+    motion.propagate(motion.step(u, Scalar(kHour)), pose);
+    NoiseOf<Master>{master}.propagate(landmark, Scalar(kHour));
+    Scalar most(0);
+    for (int i = 0; i < kPose; ++i) most = math::larger(most, pose.P(i, i));
+    for (int i = 0; i < 6; ++i) most = math::larger(most, landmark.P(i, i));
+    return most;
   }
 
   /// Echoes of `masters` masters, each at most once.
@@ -87,22 +176,73 @@ class SlatFilter {
   }
 
   /// The slave is where the caller has put it, and there is no master.
-  void start() {
+  void start(Scalar hourly_noise) {
     masters_ = 0;
     log_likelihood_ = Scalar(0);
     initialised_ = true;
+    hourly_noise_ = hourly_noise;
+    safeguards_.restart();
   }
 
   int masters_ = 0;
   Scalar log_likelihood_ = Scalar(0);
+  Scalar hourly_noise_ = Scalar(0);
   bool initialised_ = false;
+  Safeguards safeguards_;
 
  private:
+  static constexpr int kHour = 3600;
+
+  /// A master moves by x + v dt + a dt^2 / 2, the slave by its way, which its heading turns. Eight
+  /// digits are left for sums and products of the squares.
+  static AUVEST_COLD bool stays_finite(Scalar dt, Scalar speed, const Extent<Scalar>& extent,
+                                       Scalar noise) {
+    const Scalar hours = math::larger(Scalar(1), dt / Scalar(kHour));
+    const Scalar way = dt * speed;
+    const Scalar here = math::sqrt(extent.square[0]);
+    const Scalar there = here + dt * math::sqrt(extent.square[1]) +
+                         Scalar(0.5) * dt * dt * math::sqrt(extent.square[2]);
+    const Scalar most = math::sqrt(Scalar(1e-8) * std::numeric_limits<Scalar>::max());
+    return there + way * (Scalar(1) + here) <= most &&
+           math::sqrt(noise) * (hours * hours) * (Scalar(1) + speed) <= most;
+  }
+
   template <class Self, class Visit>
   static void visit_members(Self& self, Visit& visit) {
     visit.count(self.initialised_, true);
     visit.count(self.masters_, Masters);
     visit(self.log_likelihood_);
+    visit(self.hourly_noise_);
+    Safeguards::visit_state(self.safeguards_, visit);
+  }
+};
+
+/// The weight of the particles to which each echo of an update lies beyond the gate. The sums run
+/// over the particles in their order, whatever the lanes.
+template <class Scalar, int Masters>
+struct RefusedWeight {
+  Scalar of[Masters];
+
+  RefusedWeight() {
+    for (Scalar& weight : of) weight = Scalar(0);
+  }
+
+  /// Adds the particles of a group that refuse echo s: mostly none.
+  template <class Group, class Mask>
+  AUVEST_INLINE void add(int s, const Mask& beyond, const Scalar* log_weights) {
+    using math::any;
+    if (any(beyond)) add_some<Group>(s, beyond, log_weights);
+  }
+
+ private:
+  template <class Group, class Mask>
+  AUVEST_COLD void add_some(int s, Mask beyond, const Scalar* log_weights) {
+    using math::select;
+    using Lanes = typename Group::Weights;
+    using Value = typename Lanes::Value;
+    Scalar weight[Group::kParticles];
+    Lanes::store(weight, select(beyond, weight_of(Value(Lanes::load(log_weights))), Value(0)));
+    for (Scalar one : weight) of[s] = of[s] + one;
   }
 };
 
@@ -112,10 +252,10 @@ class SlatFilter {
 /// are and where others may lie (a static array on a chip, NumPy's memory in Python), and two
 /// filters on the same particles would be one. A filter that owned them would need their number at
 /// compile time. So a copy says where its particles are to lie: Filter copy(filter, storage).
-template <class Motion, int Masters, class Set_, class Resampling_>
-class ParticleSlatFilter : public SlatFilter<Motion, Masters> {
+template <class Motion, int Masters, class Set_, class Resampling_, class Safeguards>
+class ParticleSlatFilter : public SlatFilter<Motion, Masters, Safeguards> {
  public:
-  using Frame = SlatFilter<Motion, Masters>;
+  using Frame = SlatFilter<Motion, Masters, Safeguards>;
   using typename Frame::Scalar;
   using Resampling = Resampling_;
   using Set = Set_;
@@ -156,8 +296,8 @@ class ParticleSlatFilter : public SlatFilter<Motion, Masters> {
   bool fits(int particles) const { return particles > 0 && particles <= set_.capacity(); }
 
   /// So many particles of equal weights, and no master.
-  void start(int particles) {
-    Frame::start();
+  void start(int particles, Scalar hourly_noise) {
+    Frame::start(hourly_noise);
     set_.resize(particles);
     resamplings_ = 0;
     effective_size_ = Scalar(particles);
@@ -165,15 +305,16 @@ class ParticleSlatFilter : public SlatFilter<Motion, Masters> {
   }
 
   /// Section 6, step 4, after an update by `count` echoes: normalises the weights, and resamples
-  /// where N_eff is below `resample_below` times N.
-  template <class Lanes>
-  AUVEST_OUTLINE void normalise_and_resample(int count, Scalar resample_below,
-                                             math::Random& random) {
+  /// where N_eff is below `resample_below` times N; calls before() first.
+  template <class Lanes, class Before>
+  AUVEST_OUTLINE void normalise_and_resample(int count, Scalar resample_below, math::Random& random,
+                                             const Before& before) {
     const WeightSummary<Scalar> summary = normalise<Lanes>(set_);  // [SLATF 32]
     effective_size_ = summary.effective_size;                      // [SLATF 33]
     this->log_likelihood_ =
         this->log_likelihood_ + (summary.log_sum - Scalar(count) * Frame::density_constant());
     if (effective_size_ < resample_below * Scalar(set_.size())) {
+      before();
       resample<Lanes>(resampling_, set_, random);
       ++resamplings_;
     }

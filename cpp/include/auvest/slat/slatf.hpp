@@ -35,18 +35,70 @@
 namespace auvest {
 inline namespace AUVEST_INSTRUCTIONS {
 
-template <class Particle, int Masters, class Resampling>
-using SlatfFrame =
-    ParticleSlatFilter<typename Particle::Motion, Masters, typename Particle::Set, Resampling>;
+template <class Particle, int Masters, class Resampling, class Safeguards>
+using SlatfFrame = ParticleSlatFilter<typename Particle::Motion, Masters, typename Particle::Set,
+                                      Resampling, Safeguards>;
+
+/// The error of the mean over particles that past resamplings have left in it.
+template <class Scalar, int Pose, bool Known>
+class MonteCarloError {
+ public:
+  MonteCarloError() { restart(); }
+  void restart() { math::set_zero(covariance_); }
+
+  /// The covariance of the slave with it, by `spread`, that of the particles' points, of which
+  /// s = sum w^2 says how many count: a mean over few is off by a share of what it is over, and
+  /// their spread is short by that share.
+  void add_to(Matrix<Scalar, Pose, Pose>& P, const Matrix<Scalar, Pose, Pose>& spread,
+              Scalar s) const {
+    const Scalar rest = math::larger(Scalar(1) - s, Scalar(1e-3));
+    const Scalar more = Scalar(1) / rest - Scalar(1) + s;
+    for (int i = 0; i < Pose; ++i) {
+      for (int j = 0; j < Pose; ++j) {
+        P(i, j) = P(i, j) + more * spread(i, j) + covariance_(i, j);
+      }
+    }
+  }
+
+  /// A resampling from weights with s = sum w^2 of particles whose covariance is P with all this.
+  void resampled(const Matrix<Scalar, Pose, Pose>& P, Scalar s) {
+    for (int i = 0; i < Pose; ++i) {
+      for (int j = 0; j < Pose; ++j) {
+        covariance_(i, j) = covariance_(i, j) + s * (P(i, j) - covariance_(i, j));
+      }
+    }
+  }
+
+  const Matrix<Scalar, Pose, Pose>& covariance() const { return covariance_; }
+
+  template <class Self, class Visit>
+  static void visit_state(Self& self, Visit& visit) {
+    visit(self.covariance_);
+  }
+
+ private:
+  Matrix<Scalar, Pose, Pose> covariance_;
+};
+
+template <class Scalar, int Pose>
+class MonteCarloError<Scalar, Pose, false> {
+ public:
+  void restart() {}
+  template <class Self, class Visit>
+  static void visit_state(Self&, Visit&) {}
+};
 
 template <class Motion_, class Master_, class Proposal_, int Masters,
           class Resampling_ = SystematicResampling,
-          class Lanes_ = OneLane<typename Motion_::Scalar>>
-class Slatf : public SlatfFrame<SlatfParticle<Motion_, Master_, Proposal_, Masters, Lanes_>,
-                                Masters, Resampling_> {
+          class Lanes_ = OneLane<typename Motion_::Scalar>,
+          class Safeguards_ = Safeguards<typename Motion_::Scalar, Masters>>
+class Slatf : public SlatfFrame<
+                  SlatfParticle<Motion_, Master_, Proposal_, Masters, Lanes_, Safeguards_::kActive>,
+                  Masters, Resampling_, Safeguards_> {
  public:
-  using Particle = SlatfParticle<Motion_, Master_, Proposal_, Masters, Lanes_>;
-  using Frame = SlatfFrame<Particle, Masters, Resampling_>;
+  using Particle =
+      SlatfParticle<Motion_, Master_, Proposal_, Masters, Lanes_, Safeguards_::kActive>;
+  using Frame = SlatfFrame<Particle, Masters, Resampling_, Safeguards_>;
   using Motion = Motion_;
   using Master = Master_;
   using Proposal = Proposal_;
@@ -80,22 +132,23 @@ class Slatf : public SlatfFrame<SlatfParticle<Motion_, Master_, Proposal_, Maste
       : Frame(other, storage),
         motion_(other.motion_),
         master_(other.master_),
-        params_(other.params_) {}
+        params_(other.params_),
+        error_(other.error_) {}
 
   /// Section 6, start: draws the poses of `particles` particles from the prior N(pose.x, pose.P);
   /// there is no master yet. P may be singular or zero.
   Status reset(const SlaveBelief& pose, int particles, math::Random& random) {
     const bool valid = this->fits(particles) && Frame::is_share(params_.resample_below) &&
-                       math::is_nonnegative(params_.gate) &&
-                       math::is_nonnegative(params_.birth_velocity_m_s) &&
+                       params_.valid() && math::is_nonnegative(params_.birth_velocity_m_s) &&
                        math::is_positive(params_.birth_acceleration_m_s2) &&
                        (params_.gate > Scalar(0) || !births());
     if (!valid || motion_.check() != Status::kOk || master_.check() != Status::kOk) {
       return Status::kBadParameter;
     }
-    const Status status = Frame::check_slave(pose);
+    const Status status = check_slave(pose);
     if (status != Status::kOk) return status;
-    this->start(particles);
+    this->start(particles, Frame::noise_of_an_hour(motion_, master_));
+    error_.restart();
 
     Matrix<Scalar, kPose, kPose> root;
     Matrix<Scalar, 1, kPose> no_others;
@@ -135,6 +188,7 @@ class Slatf : public SlatfFrame<SlatfParticle<Motion_, Master_, Proposal_, Maste
     Schedule::for_each_group(set_, [&](int i) {
       Particle::Bank::begin(master_, copy, set_.at(i, Particle::master_field(masters_)));
     });
+    safeguards_.begin(masters_);
     ++masters_;
     return Status::kOk;
   }
@@ -144,8 +198,9 @@ class Slatf : public SlatfFrame<SlatfParticle<Motion_, Master_, Proposal_, Maste
   /// master; null: none. Takes one key of random numbers.
   Status predict(Scalar dt, const Control& u, math::Random& random,
                  const VelocityChange* changes = nullptr) {
-    const Status status = this->check_prediction(dt, u, changes);
+    const Status status = this->check_prediction(dt, u, changes, params_.longest_step_s, extent());
     if (status != Status::kOk) return status;
+    safeguards_.wait(dt, masters_);
     const Prediction prediction(motion_.step(u, dt), dt, changes, random);
     Schedule::for_each(set_, [&](const Tile& tile) { predict(tile, prediction); });
     return Status::kOk;
@@ -153,18 +208,26 @@ class Slatf : public SlatfFrame<SlatfParticle<Motion_, Master_, Proposal_, Maste
 
   /// Updates by what the sonar heard at one time: any number of masters, each at most once. Masters
   /// that were not heard keep all their bits, [SLATF 34]. An echo of kUnknownMaster is, in each
-  /// particle, that of the master to which it is likeliest (nearest neighbour). Takes one key of
-  /// random numbers, then what the resampling policy takes.
+  /// particle, that of the master to which it is likeliest (nearest neighbour). An echo of a master
+  /// that is lost or was silent for too long is its rebirth (safeguards.hpp). Takes one key of
+  /// random numbers, then what the resampling policy takes, then a key for each rebirth.
   Status update(const Echo<Scalar>* echoes, int count, const Sonar<Scalar>& sonar,
                 math::Random& random) {
     const Status status = check(echoes, count, sonar);
     if (status != Status::kOk || count == 0) return status;
     Update update(echoes, count, sonar, params_, random);
+    RefusedWeight<Scalar, Safeguards_::kActive ? Masters : 1> refused;
+    watch(update, refused);
     Echo<Scalar> old[Masters];  // what is left after births
-    if (births()) {
+    const Echo<Scalar>* reborn[Masters];
+    int rebirths = 0;
+    if (births() || remembers_silence()) {
       int left = 0;
       for (int s = 0; s < count; ++s) {
-        if (births() && echoes[s].master == kUnknownMaster && is_unassociated(update, s)) {
+        if (echoes[s].master != kUnknownMaster) {
+          const bool forgotten = safeguards_.forgotten(echoes[s].master, params_);
+          (forgotten ? reborn[rebirths++] = &echoes[s] : &(old[left++] = echoes[s]));
+        } else if (births() && is_unassociated(update, s)) {
           add_master(update, s);
         } else {
           old[left++] = echoes[s];
@@ -172,10 +235,12 @@ class Slatf : public SlatfFrame<SlatfParticle<Motion_, Master_, Proposal_, Maste
       }
       update.echoes = old;
       update.count = left;
-      if (left == 0) return Status::kOk;
     }
-    Schedule::for_each(set_, [&](const Tile& tile) { correct(tile, update); });
-    this->template normalise_and_resample<Lanes>(update.count, params_.resample_below, random);
+    if (update.count > 0) {
+      Schedule::for_each(set_, [&](const Tile& tile) { correct(tile, update); });
+      weigh_up(update, random);
+    }
+    for (int k = 0; k < rebirths; ++k) rebirth(*reborn[k], sonar, random);
     return Status::kOk;
   }
 
@@ -183,31 +248,48 @@ class Slatf : public SlatfFrame<SlatfParticle<Motion_, Master_, Proposal_, Maste
   Status step(Scalar dt, const Control& u, const VelocityChange* changes,
               const Echo<Scalar>* echoes, int count, const Sonar<Scalar>& sonar,
               math::Random& random) {
-    Status status = this->check_prediction(dt, u, changes);
+    Status status = this->check_prediction(dt, u, changes, params_.longest_step_s, extent());
     if (status == Status::kOk) status = check(echoes, count, sonar);
     if (status != Status::kOk) return status;
-    if (count == 0 || births()) {
+    if (count == 0 || births() || remembers_silence()) {
       predict(dt, u, random, changes);
       return update(echoes, count, sonar, random);
     }
     const Prediction prediction(motion_.step(u, dt), dt, changes, random);
-    const Update update(echoes, count, sonar, params_, random);
+    Update update(echoes, count, sonar, params_, random);
+    RefusedWeight<Scalar, Safeguards_::kActive ? Masters : 1> refused;
+    watch(update, refused);
+    safeguards_.wait(dt, masters_);
     Schedule::for_each(set_, [&](const Tile& tile) {
       predict(tile, prediction);
       correct(tile, update);
     });
-    this->template normalise_and_resample<Lanes>(count, params_.resample_below, random);
+    weigh_up(update, random);
     return Status::kOk;
   }
 
-  /// Mean and covariance of the slave's pose; the heading's mean is that of unit vectors.
+  /// Mean and covariance of the slave's pose; the heading's mean is that of unit vectors. The
+  /// covariance is too small where much is resampled, with `monte_carlo` less so.
   SlaveBelief slave() const {
-    return summarise<Lanes, kPose, Proposal::kInformed, (kPose > 2)>(set_, kPoseField);
+    SlaveBelief pose = summarise<Lanes, kPose, Proposal::kInformed, (kPose > 2)>(set_, kPoseField);
+    add_monte_carlo(pose.P, square_sum(), MonteCarlo<Safeguards_::kActive>());
+    return pose;
   }
 
-  /// Mean and covariance of master n.
+  /// Mean and covariance of master n. What resampling has left in the mean slave and masters share.
   MasterBelief master(int n) const {
-    return summarise<Lanes, 6, true, false>(set_, Particle::master_field(n));
+    MasterBelief master = summarise<Lanes, 6, true, false>(set_, Particle::master_field(n));
+    add_monte_carlo(master, MonteCarlo<Safeguards_::kActive>());
+    return master;
+  }
+
+  Scalar longest_step_s() const { return params_.longest_step_s; }
+
+  /// As SlatFilter::visit_state.
+  template <class Self, class Visit>
+  static void visit_state(Self& self, Visit& visit) {
+    Frame::visit_state(self, visit);
+    MonteCarloError<Scalar, kPose, Safeguards_::kActive>::visit_state(self.error_, visit);
   }
 
   /// With an Imm as Master: the probability that its model k moves master n.
@@ -255,7 +337,118 @@ class Slatf : public SlatfFrame<SlatfParticle<Motion_, Master_, Proposal_, Maste
   using Prediction = typename Particle::Prediction;
   using Update = typename Particle::Update;
   using Frame::masters_;
+  using Frame::safeguards_;
   using Frame::set_;
+  template <bool>
+  struct MonteCarlo {};
+  template <int Size>
+  using Refused = RefusedWeight<Scalar, Size>;
+
+  // ---- Safeguards (safeguards.hpp), which are ours, not the paper's
+
+  bool remembers_silence() const {
+    return Safeguards_::kActive && params_.forget_after_s > Scalar(0);
+  }
+
+  static void watch(Update& update, Refused<Masters>& refused) { update.refused = &refused; }
+  template <class None>
+  static void watch(Update&, None&) {}
+
+  /// What the particles say of an update that they have taken in: of their weights, [SLATF 32] and
+  /// [SLATF 33], and of echoes that they refuse.
+  void weigh_up(const Update& update, math::Random& random) {
+    this->template normalise_and_resample<Lanes>(
+        update.count, params_.resample_below, random,
+        [this] { remember_error(MonteCarlo<Safeguards_::kActive>()); });
+    if (!Safeguards_::kActive) return;
+    for (int s = 0; s < update.count; ++s) {
+      const Echo<Scalar>& echo = update.echoes[s];
+      if (echo.master == kUnknownMaster) continue;
+      if (!(update.refused->of[s] > Scalar(0.5))) {
+        safeguards_.accepted(echo.master);
+      } else if (safeguards_.refused(echo.master, place_of(update.sonar, echo.z, slave().x),
+                                     echo.z(0), update.sonar.params, params_)) {
+        rebirth(echo, update.sonar, random);
+      }
+    }
+  }
+
+  /// Each particle's master is born where it hears the echo come from. What its pose has gathered
+  /// since it was drawn would tie them together, and a particle has no room for that: so it is
+  /// drawn now.
+  AUVEST_COLD void rebirth(const Echo<Scalar>& echo, const Sonar<Scalar>& sonar,
+                           math::Random& random) {
+    const math::CounterKey key(random);
+    const bool drawn = Proposal::kInformed && !params_.carry_covariance;
+    Schedule::for_each_group(set_, [&](int i) {
+      const Single particle = {set_, i};
+      typename Single::Pose pose;
+      particle.load(pose);
+      if (drawn) {
+        Matrix<Value, kPose, kPose> root;
+        Matrix<Value, 1, kPose> no_others;
+        Value e[kPose + 1];
+        math::factor_leading<math::DropLostPivots>(pose.P, root, no_others);
+        Particle::draw(typename Schedule::Single(), i, key, e);
+        Particle::sample(root, e, pose.x);
+        math::set_zero(pose.P);
+        particle.store(pose);
+      }
+      Belief<Value, 6> born;
+      give_birth(sonar, echo.z, pose, Proposal::kInformed && !drawn,
+                 params_.rebirth_velocity_variance(), params_.rebirth_acceleration_variance(),
+                 born);
+      Particle::Bank::begin(master_, born, particle.master(echo.master));
+    });
+    safeguards_.reborn(echo.master);
+  }
+
+  // ---- The error of the mean over particles
+
+  /// sum w^2
+  Scalar square_sum() const {
+    const bool resampled =
+        this->effective_size() < params_.resample_below * Scalar(set_.size());  // last
+    return Scalar(1) / (resampled ? Scalar(set_.size()) : this->effective_size());
+  }
+
+  void add_monte_carlo(Matrix<Scalar, kPose, kPose>&, Scalar, MonteCarlo<false>) const {}
+  void add_monte_carlo(Matrix<Scalar, kPose, kPose>& P, Scalar s, MonteCarlo<true>) const {
+    if (!params_.monte_carlo) return;
+    error_.add_to(P, summarise<Lanes, kPose, false, (kPose > 2)>(set_, kPoseField).P, s);
+  }
+  void add_monte_carlo(MasterBelief&, MonteCarlo<false>) const {}
+  void add_monte_carlo(MasterBelief& master, MonteCarlo<true>) const {
+    for (int i = 0; params_.monte_carlo && i < 2; ++i) {
+      for (int j = 0; j < 2; ++j) {
+        master.P(i, j) = master.P(i, j) + error_.covariance()(i, j);
+      }
+    }
+  }
+  void remember_error(MonteCarlo<false>) {}
+  void remember_error(MonteCarlo<true>) {
+    if (!params_.monte_carlo) return;
+    const Scalar s = Scalar(1) / this->effective_size();
+    SlaveBelief pose = summarise<Lanes, kPose, Proposal::kInformed, (kPose > 2)>(set_, kPoseField);
+    add_monte_carlo(pose.P, s, MonteCarlo<true>());
+    error_.resampled(pose.P, s);
+  }
+
+  /// The extent of the first particle. The others are not far from it.
+  Extent<Scalar> extent() const {
+    using One = OneLane<Scalar>;
+    SlaveBelief pose;
+    math::set_zero(pose.P);
+    load_mean<One>(set_.at(0, kPoseField), pose.x);
+    if (Proposal::kInformed) load_belief<One>(set_.at(0, kPoseField), pose);
+    Extent<Scalar> result = Frame::extent_of(pose);
+    for (int n = 0; n < masters_; ++n) {
+      MasterBelief master;
+      load_belief<One>(set_.at(0, Particle::master_field(n)), master);
+      Frame::extend(master, kPose, result);
+    }
+    return result;
+  }
 
   /// With births, as many echoes as there may be masters.
   Status check(const Echo<Scalar>* echoes, int count, const Sonar<Scalar>& sonar) const {
@@ -348,21 +541,25 @@ class Slatf : public SlatfFrame<SlatfParticle<Motion_, Master_, Proposal_, Maste
                  acceleration, master);
       Particle::Bank::begin(master_, master, particle.master(masters_));
     });
+    safeguards_.begin(masters_);
     ++masters_;
   }
 
   Motion motion_;
   Master master_;
   Params params_;
+  MonteCarloError<Scalar, kPose, Safeguards_::kActive> error_;
 };
 
 template <class Motion, class Master, int Masters, class Resampling = SystematicResampling,
-          class Lanes = OneLane<typename Motion::Scalar>>
-using Slatf1 = Slatf<Motion, Master, MotionProposal, Masters, Resampling, Lanes>;
+          class Lanes = OneLane<typename Motion::Scalar>,
+          class Safeguards_ = Safeguards<typename Motion::Scalar, Masters>>
+using Slatf1 = Slatf<Motion, Master, MotionProposal, Masters, Resampling, Lanes, Safeguards_>;
 
 template <class Motion, class Master, int Masters, class Resampling = SystematicResampling,
-          class Lanes = OneLane<typename Motion::Scalar>>
-using Slatf2 = Slatf<Motion, Master, MeasurementProposal, Masters, Resampling, Lanes>;
+          class Lanes = OneLane<typename Motion::Scalar>,
+          class Safeguards_ = Safeguards<typename Motion::Scalar, Masters>>
+using Slatf2 = Slatf<Motion, Master, MeasurementProposal, Masters, Resampling, Lanes, Safeguards_>;
 
 }  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -24,6 +24,7 @@
 #include "auvest/particles/resampling.hpp"
 #include "auvest/slat/echo.hpp"
 #include "auvest/slat/joint_gaussian.hpp"
+#include "auvest/slat/safeguards.hpp"
 #include "auvest/slat/slat_filter.hpp"
 #include "auvest/status.hpp"
 #include "auvest/types.hpp"
@@ -32,12 +33,9 @@ namespace auvest {
 inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar>
-struct SlatfJointParams {
+struct SlatfJointParams : EchoParams<Scalar> {
   Scalar resample_below = Scalar(0.5);  ///< resample where N_eff < this times N, [SLATF 33]
   Scalar kept = Scalar(0.5);  ///< share of the covariance of range and bearing that is not drawn
-  /// An echo whose NIS (2 degrees of freedom) exceeds this in a particle says nothing to it;
-  /// against outliers. 16 loses one good echo in 3,000. 0: no gate.
-  Scalar gate = Scalar(0);
 };
 
 /// The fields of a particle: the pose and each master, mean and lower triangle, then the
@@ -52,17 +50,18 @@ struct SlatfJointFields {
   static constexpr int kFields = kCrossField + kCrossNumbers;
 };
 
-template <class Motion, int Masters, class Resampling>
+template <class Motion, int Masters, class Resampling, class Safeguards>
 using SlatfJointFrame = ParticleSlatFilter<
     Motion, Masters,
     ParticleSet<typename Motion::Scalar, SlatfJointFields<Motion::kStates, Masters>::kFields>,
-    Resampling>;
+    Resampling, Safeguards>;
 
-template <class Motion_, class Master_, int Masters, class Resampling_ = SystematicResampling>
-class SlatfJoint : public SlatfJointFrame<Motion_, Masters, Resampling_>,
+template <class Motion_, class Master_, int Masters, class Resampling_ = SystematicResampling,
+          class Safeguards_ = Safeguards<typename Motion_::Scalar, Masters>>
+class SlatfJoint : public SlatfJointFrame<Motion_, Masters, Resampling_, Safeguards_>,
                    public SlatfJointFields<Motion_::kStates, Masters> {
  public:
-  using Frame = SlatfJointFrame<Motion_, Masters, Resampling_>;
+  using Frame = SlatfJointFrame<Motion_, Masters, Resampling_, Safeguards_>;
   using Fields = SlatfJointFields<Motion_::kStates, Masters>;
   using Motion = Motion_;
   using Master = Master_;
@@ -97,11 +96,11 @@ class SlatfJoint : public SlatfJointFrame<Motion_, Masters, Resampling_>,
   /// Nothing is drawn before an echo comes.
   Status reset(const SlaveBelief& pose, int particles, math::Random&) {
     const bool valid = this->fits(particles) && Frame::is_share(params_.resample_below) &&
-                       Frame::is_share(params_.kept) && math::is_nonnegative(params_.gate);
+                       Frame::is_share(params_.kept) && params_.valid();
     if (!valid || model_.check() != Status::kOk) return Status::kBadParameter;
-    const Status status = Frame::check_slave(pose);
+    const Status status = check_slave(pose);
     if (status != Status::kOk) return status;
-    this->start(particles);
+    this->start(particles, Frame::noise_of_an_hour(model_.motion, model_.master[0]));
     Joint joint;
     Model::start(pose, joint);
     for (int i = 0; i < set_.size(); ++i) store(i, joint);
@@ -122,6 +121,7 @@ class SlatfJoint : public SlatfJointFrame<Motion_, Masters, Resampling_>,
       store_belief<Lanes>(set_.at(i, master_field(masters_)), belief);
     }
     set_.fill_block();
+    safeguards_.begin(masters_);
     ++masters_;
     return Status::kOk;
   }
@@ -131,8 +131,9 @@ class SlatfJoint : public SlatfJointFrame<Motion_, Masters, Resampling_>,
   /// master; null: none. Takes no random numbers.
   Status predict(Scalar dt, const Control& u, math::Random&,
                  const VelocityChange* changes = nullptr) {
-    const Status status = this->check_prediction(dt, u, changes);
+    const Status status = this->check_prediction(dt, u, changes, params_.longest_step_s, extent());
     if (status != Status::kOk) return status;
+    safeguards_.wait(dt, masters_);
     const typename Motion::Step move = model_.motion.step(u, dt);
     for (int i = 0; i < set_.size(); ++i) {
       Joint joint;
@@ -150,14 +151,15 @@ class SlatfJoint : public SlatfJointFrame<Motion_, Masters, Resampling_>,
                 math::Random& random) {
     const Status status = this->check_update(echoes, count, masters_, sonar);
     if (status != Status::kOk || count == 0) return status;
-    const math::CounterKey key(random);
-    for (int i = 0; i < set_.size(); ++i) {
+    const Update update(echoes, count, sonar, *this, random);
+    Refused refused;
+    for (int i = 0; update.left > 0 && i < set_.size(); ++i) {
       Joint joint;
       load(i, joint);
-      correct(i, echoes, count, sonar, key, joint);
+      correct(i, update, refused, joint);
       store(i, joint);
     }
-    this->template normalise_and_resample<Lanes>(count, params_.resample_below, random);
+    weigh_up(update, refused, random);
     return Status::kOk;
   }
 
@@ -165,20 +167,22 @@ class SlatfJoint : public SlatfJointFrame<Motion_, Masters, Resampling_>,
   Status step(Scalar dt, const Control& u, const VelocityChange* changes,
               const Echo<Scalar>* echoes, int count, const Sonar<Scalar>& sonar,
               math::Random& random) {
-    Status status = this->check_prediction(dt, u, changes);
+    Status status = this->check_prediction(dt, u, changes, params_.longest_step_s, extent());
     if (status == Status::kOk) status = this->check_update(echoes, count, masters_, sonar);
     if (status != Status::kOk) return status;
     if (count == 0) return predict(dt, u, random, changes);
+    safeguards_.wait(dt, masters_);
     const typename Motion::Step move = model_.motion.step(u, dt);
-    const math::CounterKey key(random);
+    const Update update(echoes, count, sonar, *this, random);
+    Refused refused;
     for (int i = 0; i < set_.size(); ++i) {
       Joint joint;
       load(i, joint);
       model_.predict(move, dt, changes, masters_, joint);
-      correct(i, echoes, count, sonar, key, joint);
+      if (update.left > 0) correct(i, update, refused, joint);
       store(i, joint);
     }
-    this->template normalise_and_resample<Lanes>(count, params_.resample_below, random);
+    weigh_up(update, refused, random);
     return Status::kOk;
   }
 
@@ -192,6 +196,8 @@ class SlatfJoint : public SlatfJointFrame<Motion_, Masters, Resampling_>,
     return summarise<Lanes, 6, true, false>(set_, master_field(n));
   }
 
+  Scalar longest_step_s() const { return params_.longest_step_s; }
+
   /// The Gaussian of particle i: slave and masters, only the lower triangle of P.
   Joint particle(int i) const {
     Joint joint;
@@ -202,7 +208,68 @@ class SlatfJoint : public SlatfJointFrame<Motion_, Masters, Resampling_>,
  private:
   using Lanes = OneLane<Scalar>;
   using Frame::masters_;
+  using Frame::safeguards_;
   using Frame::set_;
+  using Refused = RefusedWeight<Scalar, Masters>;
+
+  /// What an update is, for all particles: first the echoes that correct, then those that are the
+  /// rebirth of a forgotten master.
+  struct Update {
+    Echo<Scalar> echoes[Masters];
+    int left = 0;
+    int count;
+    const Sonar<Scalar>& sonar;
+    math::CounterKey key;
+
+    Update(const Echo<Scalar>* heard, int number, const Sonar<Scalar>& device,
+           const SlatfJoint& filter, math::Random& random)
+        : count(number), sonar(device), key(random) {
+      int last = number;
+      for (int s = 0; s < number; ++s) {
+        const bool forgotten = heard[s].master != kUnknownMaster &&
+                               filter.safeguards_.forgotten(heard[s].master, filter.params_);
+        echoes[forgotten ? --last : left++] = heard[s];
+      }
+    }
+  };
+
+  /// The extent of the first particle. The others are not far from it.
+  Extent<Scalar> extent() const {
+    Joint joint;
+    load(0, joint);
+    return Frame::extent_of(joint);
+  }
+
+  /// What the particles say of an update that they have taken in: of their weights and of echoes
+  /// that they refuse.
+  void weigh_up(const Update& update, const Refused& refused, math::Random& random) {
+    if (update.left > 0) {
+      this->template normalise_and_resample<Lanes>(update.left, params_.resample_below, random,
+                                                   [] {});
+    }
+    for (int s = update.left; s < update.count; ++s) rebirth(update.echoes[s], update.sonar);
+    for (int s = 0; Safeguards_::kActive && s < update.left; ++s) {
+      const Echo<Scalar>& echo = update.echoes[s];
+      if (echo.master == kUnknownMaster) continue;
+      if (!(refused.of[s] > Scalar(0.5))) {
+        safeguards_.accepted(echo.master);
+      } else if (safeguards_.refused(echo.master, place_of(update.sonar, echo.z, slave().x),
+                                     echo.z(0), update.sonar.params, params_)) {
+        rebirth(echo, update.sonar);
+      }
+    }
+  }
+
+  AUVEST_COLD void rebirth(const Echo<Scalar>& echo, const Sonar<Scalar>& sonar) {
+    for (int i = 0; i < set_.size(); ++i) {
+      Joint joint;
+      load(i, joint);
+      Model::give_rebirth(echo.z, echo.master, sonar, params_, joint);
+      store(i, joint);
+    }
+    set_.fill_block();
+    safeguards_.reborn(echo.master);
+  }
 
   static int master_field(int n) { return Fields::kMasterField + n * Fields::kMasterNumbers; }
 
@@ -244,23 +311,25 @@ class SlatfJoint : public SlatfJointFrame<Motion_, Masters, Resampling_>,
 
   /// All that the echoes do to particle i: they refine its Gaussian one after the other and weigh
   /// it, [SLATF 65]. Then it draws, once: the master of the first echo within the gate.
-  void correct(int i, const Echo<Scalar>* echoes, int count, const Sonar<Scalar>& sonar,
-               const math::CounterKey& key, Joint& joint) {
+  void correct(int i, const Update& update, Refused& refused, Joint& joint) {
     Scalar& log_weight = set_.log_weights()[i];
+    const Scalar before = log_weight;
     int first = kUnknownMaster;
     int who[Masters];
-    Model::identify(joint, echoes, count, masters_, sonar, params_.gate, who);
-    for (int s = 0; s < count && s < Masters; ++s) {  // count <= Masters
+    Model::identify(joint, update.echoes, update.left, masters_, update.sonar, params_.gate, who);
+    for (int s = 0; s < update.left && s < Masters; ++s) {  // left <= Masters
       Score<Scalar> score;
-      const bool finite = Model::correct(echoes[s].z, who[s], sonar, params_.gate, joint, score);
+      const bool finite =
+          Model::correct(update.echoes[s].z, who[s], update.sonar, params_.gate, joint, score);
       const bool outlier = params_.gate > Scalar(0) && score.nis > params_.gate;
       if (first == kUnknownMaster && finite && !outlier) first = who[s];
+      if (outlier) refused.of[s] = refused.of[s] + weight_of(before);
       log_weight = log_weight + score.log_density;
     }
     if (first == kUnknownMaster || !(params_.kept < Scalar(1))) return;
     Scalar e[2];
-    math::counter_normal_pair(key, Lanes::index(i), 0u, e[0], e[1]);
-    Model::draw(first, sonar, params_.kept, e, joint);
+    math::counter_normal_pair(update.key, Lanes::index(i), 0u, e[0], e[1]);
+    Model::draw(first, update.sonar, params_.kept, e, joint);
   }
 
   Model model_;

@@ -16,26 +16,29 @@
 #include "auvest/slat/master_bank.hpp"
 #include "auvest/slat/master_ekf.hpp"
 #include "auvest/slat/proposals.hpp"
+#include "auvest/slat/safeguards.hpp"
+#include "auvest/slat/slat_filter.hpp"
 #include "auvest/types.hpp"
 
 namespace auvest {
 inline namespace AUVEST_INSTRUCTIONS {
 
 template <class Scalar>
-struct SlatfParams {
+struct SlatfParams : EchoParams<Scalar> {
   Scalar resample_below = Scalar(0.5);  ///< resample where N_eff < this times N, [SLATF 33]
   bool carry_covariance = false;        ///< 2.0 only: [SLATF 50] to the letter, see proposals.hpp
-  /// An echo whose NIS (2 degrees of freedom) exceeds this in a particle says nothing to it;
-  /// against outliers. 16 loses one good echo in 3,000. 0: no gate, the paper.
-  Scalar gate = Scalar(0);
   /// Standard deviations of the velocity [m/s] and the acceleration [m/s^2] of a master that is
   /// born from an echo of kUnknownMaster: where particles with more than half of the weight find
   /// the echo beyond the gate of every master. 0: no births. Needs a gate.
   Scalar birth_velocity_m_s = Scalar(0);
   Scalar birth_acceleration_m_s2 = Scalar(0.01);
+  /// The slave's covariance includes what the number of particles costs (slatf.hpp). The paper's
+  /// does not.
+  bool monte_carlo = true;
 };
 
-template <class Motion_, class Master_, class Proposal_, int Masters, class Lanes_>
+/// Watched: the echoes that particles refuse are counted (safeguards.hpp).
+template <class Motion_, class Master_, class Proposal_, int Masters, class Lanes_, bool Watched>
 struct SlatfParticle {
   using Motion = Motion_;
   using Master = Master_;
@@ -179,6 +182,7 @@ struct SlatfParticle {
     const Sonar<Scalar>& sonar;
     math::CounterKey key;
     const SlatfParams<Scalar>& params;
+    RefusedWeight<Scalar, Masters>* refused = nullptr;  ///< Watched: where they are counted
 
     Update(const Echo<Scalar>* heard, int number, const Sonar<Scalar>& device,
            const SlatfParams<Scalar>& settings, math::Random& random)
@@ -193,6 +197,13 @@ struct SlatfParticle {
 
     /// Without a gate, one that no NIS of check_echoes() reaches.
     Scalar limit() const { return params.gate > Scalar(0) ? params.gate : Scalar(1e35); }
+
+    /// Counts the particles of a group that refuse echo s. Their weights are those before the
+    /// update.
+    template <class Group, class V>
+    AUVEST_INLINE void count_refusals(int s, const V& nis, const Scalar* log_weights) const {
+      if (Watched) refused->template add<Group>(s, nis > V(limit()), log_weights);
+    }
   };
 
   template <class V>
@@ -259,9 +270,11 @@ struct SlatfParticle {
         const Place<V> source = particle.place(echo.master);
         View<V> view;
         update.sonar.look(pose.x, source.x(0), source.x(1), echo.z, view);  // [SLATF 51]
-        log_weight =
-            log_weight + MeasurementProposal::refine(view, update.sonar.template R<V>(),
-                                                     source.root, V(update.limit()), pose, root);
+        V nis;
+        log_weight = log_weight + MeasurementProposal::refine(view, update.sonar.template R<V>(),
+                                                              source.root, V(update.limit()), pose,
+                                                              root, nis);
+        update.template count_refusals<Group>(s, nis, set.log_weights() + i);
       }
       particle.multiply_weight(log_weight);  // [SLATF 62]
       sample_pose(group, i, set, root, e, update, pose);
@@ -305,8 +318,10 @@ struct SlatfParticle {
         const Value limit = select(any, Value(update.limit()), Value(0));
         View<Value> view;
         update.sonar.look(pose.x, source.x(0), source.x(1), echo.z, view);  // [SLATF 51]
+        Value nis;
         const Value density = MeasurementProposal::refine(view, update.sonar.template R<Value>(),
-                                                          source.root, limit, pose, root);
+                                                          source.root, limit, pose, root, nis);
+        if (known) update.template count_refusals<Group>(s, nis, set.log_weights() + i);
         log_weight = log_weight + select(any, density, Value(0));
       }
       if (!Proposal::kInformed) return;
@@ -329,7 +344,25 @@ struct SlatfParticle {
     Matrix<V, 2, 2> noise = update.sonar.template R<V>();
     ekf.innovate(update.sonar, update.echoes[s].z, pose, master(0), master(1), update.params.gate,
                  noise);
+    count_saturated(particle, update, s, ekf.posterior.nis);
     return Proposal::kInformed ? V(0) : log_density(ekf.valid, ekf.posterior, noise);  // [SLATF 31]
+  }
+
+  /// 1.0: counts the particles whose NIS, as saturate() leaves it, says that they refuse echo s.
+  /// (2.0 has counted already, by the proposal.) Echoes before s have weighed, so of an update by
+  /// several the first alone is counted by weight, and the others by number.
+  template <class Group, class V>
+  static AUVEST_INLINE void count_saturated(const Numbers<Group>& particle, const Update& update,
+                                            int s, const V& nis) {
+    if (!Watched || Proposal::kInformed || !(update.params.gate > Scalar(0))) return;
+    if (update.echoes[s].master == kUnknownMaster) return;
+    const Scalar equal = -math::log(Scalar(particle.set.size()));
+    Scalar number[Group::kParticles];
+    for (int k = 0; k < Group::kParticles; ++k) {
+      number[k] = particle.i + k < particle.set.size() ? equal : no_log_weight<Scalar>();
+    }
+    update.refused->template add<Group>(s, !(nis < V(update.params.gate)),
+                                        s == 0 ? particle.set.log_weights() + particle.i : number);
   }
 
   template <class Group, class V>
@@ -422,6 +455,7 @@ struct SlatfParticle {
       const Update& update;
       int s;
       Vector<Value, kPose> pose;
+      Value* nis;  ///< the smallest of the models'
 
       AUVEST_INLINE math::Mask<Value> operator()(Belief<Value, 6>& master, Value& density) const {
         MasterEkf<Value> ekf;
@@ -429,6 +463,7 @@ struct SlatfParticle {
         ekf.factor(master.P);
         ekf.innovate(update.sonar, update.echoes[s].z, pose, master.x(0), master.x(1),
                      update.params.gate, noise);
+        *nis = math::select(ekf.posterior.nis < *nis, ekf.posterior.nis, *nis);
         const math::Mask<Value> moved = ekf.correct(master);
         density = log_density(moved, ekf.posterior, noise);  // [SLATF 31]
         return moved;
@@ -439,13 +474,15 @@ struct SlatfParticle {
     void operator()(Group, int i, int g) const {
       using math::select;
       const Single particle = {set, i};
-      Ekf ekf = {update, s, Vector<Value, kPose>()};
+      Value nis(update.limit());
+      Ekf ekf = {update, s, Vector<Value, kPose>(), &nis};
       load_mean<Lanes>(particle.pose(), ekf.pose);
       math::Mask<Value> mine = math::Mask<Value>();
       if (chosen != nullptr) mine = is_master(chosen[g][s], n);
       const Value density =
           Bank::correct(ekf, chosen != nullptr ? &mine : nullptr, particle.master(n));
       if (Proposal::kInformed) return;
+      count_saturated(particle, update, s, nis);
       particle.multiply_weight(chosen == nullptr ? density : select(mine, density, Value(0)));
     }
   };

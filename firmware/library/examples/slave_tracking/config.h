@@ -10,8 +10,10 @@ using Motion = auvest::CompassMotion<float>;
 using Master = auvest::PiecewiseAcceleration<float>;
 
 /// Slatf2 draws the slave's poses with the echo in view. Slatf1 draws them blindly: it takes less
-/// RAM and is worse where the sonar is precise.
-using Filter = auvest::Slatf2<Motion, Master, 1>;
+/// RAM and is worse where the sonar is precise. As in the paper nothing guards it: without
+/// NoSafeguards a master that is lost is found again, for more flash.
+using Filter = auvest::Slatf2<Motion, Master, 1, auvest::SystematicResampling,
+                              auvest::OneLane<float>, auvest::NoSafeguards>;
 
 /// Particles. They come in blocks of 16: 48 is what the MEGA2560 holds.
 constexpr int kParticles = 48;

@@ -48,9 +48,16 @@ auvest::Sonar<float>::Params echo_noise() {
   return params;
 }
 
+// Every echo counts, as in the paper.
+Filter::Params no_gate() {
+  Filter::Params params;
+  params.gate = 0;
+  return params;
+}
+
 // All objects are global: what they take is known before the sketch runs.
 Filter::Storage<kParticles> particles;
-Filter filter(Motion(readings_noise()), Master(), Filter::Params(), particles);
+Filter filter(Motion(readings_noise()), Master(), no_gate(), particles);
 auvest::math::Random random_numbers(kSeed);
 const auvest::Sonar<float> sonar(echo_noise());
 const MasterPlan plan;

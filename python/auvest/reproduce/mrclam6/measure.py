@@ -8,6 +8,7 @@ of this package.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,6 +30,7 @@ from auvest import (
 )
 from auvest._arguments import Floats
 from auvest.reproduce.ticks import Ticks
+from auvest.slat import OverconfidenceWarning
 
 DEFAULT_RUNS = 24
 DEFAULT_SEED = 1
@@ -155,7 +157,7 @@ class Recording:
         }
         self._sightings = sightings
 
-    def tracks(self) -> list[Track]:
+    def tracks(self, gap_s: float = GAP_S, duration_s: float = DURATION_S) -> list[Track]:
         """Cut the sightings into tracks, where both robots' truth is known."""
         result = []
         for slave in ROBOTS:
@@ -164,8 +166,8 @@ class Recording:
                 echoes = self._sightings[seen][:, [0, 3, 4]]
                 known = self._has_truth(slave, echoes[:, 0]) & self._has_truth(master, echoes[:, 0])
                 echoes = echoes[known]
-                for run in np.split(echoes, np.flatnonzero(np.diff(echoes[:, 0]) > GAP_S) + 1):
-                    if len(run) and run[-1, 0] - run[0, 0] >= DURATION_S:
+                for run in np.split(echoes, np.flatnonzero(np.diff(echoes[:, 0]) > gap_s) + 1):
+                    if len(run) and run[-1, 0] - run[0, 0] >= duration_s:
                         result.append(self._track(slave, master, run))
         return result
 
@@ -244,7 +246,8 @@ def follow(track: Track, name: str, *, seed: int = DEFAULT_SEED) -> Path2D:
     if name == "dead_reckoning":
         run = DeadReckoning(start, none, motion=MOTION).run(track.time_s, track.u)
         return Path2D(slave=run.x[:, :2], master=np.full((len(run), 2), np.nan))
-    common: dict[str, Any] = {"motion": MOTION, "sonar": SONAR, "gate": GATE}
+    # Without recovery: what these models do by themselves.
+    common: dict[str, Any] = {"motion": MOTION, "sonar": SONAR, "gate": GATE, "recover_after": 0}
     filter_: EkfSlat | Slatf
     if name == "slatf2":
         filter_ = Slatf(
@@ -253,7 +256,9 @@ def follow(track: Track, name: str, *, seed: int = DEFAULT_SEED) -> Path2D:
     else:
         filter_ = EkfSlat(start, none, master=MASTER if name == "ekf_slat" else ONE_MODEL, **common)
     filter_.add_master(*first_seen(start, track.first))
-    run = filter_.run(track.time_s, track.u, z=track.z, z_time_s=track.z_time_s)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", OverconfidenceWarning)  # only means are compared
+        run = filter_.run(track.time_s, track.u, z=track.z, z_time_s=track.z_time_s)
     return Path2D(slave=run.x[:, :2], master=run.masters_x[:, 0, :2])
 
 

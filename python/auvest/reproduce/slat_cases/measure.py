@@ -129,25 +129,22 @@ def imm(
 
 
 def slat_filter(name: str, scenario: SlatScenario, particles: int = PARTICLES) -> SlatFilter:
-    """Set up a filter of the crossing: it knows the noise of all sensors."""
+    """Set up a filter of the crossing: it knows the noise of all sensors, and no echo is wrong."""
     x0, P0 = _start(scenario)
-    master, motion, sonar = PiecewiseAcceleration(), scenario.motion, scenario.sonar
+    master = PiecewiseAcceleration()
+    models: dict[str, Any] = {"motion": scenario.motion, "master": master, "sonar": scenario.sonar}
     if name == "slatf2":
-        return Slatf(
-            x0, P0, version=2, particles=particles, motion=motion, master=master, sonar=sonar
-        )
+        return Slatf(x0, P0, version=2, particles=particles, gate=0, monte_carlo=False, **models)
     if name == "slatf_joint":
         room = len(scenario.masters)
-        return SlatfJoint(
-            x0, P0, particles=particles, max_masters=room, motion=motion, master=master, sonar=sonar
-        )
+        return SlatfJoint(x0, P0, particles=particles, max_masters=room, gate=0, **models)
     return ekf_slat(scenario, master)
 
 
 def ekf_slat(scenario: SlatScenario, master: Master) -> EkfSlat:
     """Set up EKF-SLAT with a model of the master."""
     x0, P0 = _start(scenario)
-    return EkfSlat(x0, P0, motion=scenario.motion, master=master, sonar=scenario.sonar)
+    return EkfSlat(x0, P0, motion=scenario.motion, master=master, sonar=scenario.sonar, gate=0)
 
 
 def _start(scenario: SlatScenario) -> tuple[Floats, Floats]:

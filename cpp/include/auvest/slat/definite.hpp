@@ -1,0 +1,104 @@
+// Keeps a covariance positive definite where an echo ends a long silence.
+//
+// The update of square_root_update.hpp takes the states that the sonar does not see from a
+// difference, P_uu - (P_uo - P_uo+) B'. After hours without an echo the prediction is so large that
+// what is left of it is below its last digit. With C = P_uu - B P_oo B', what the observed states
+// do not say of the others and no echo changes,
+//
+//     P_uu+ = C + B P_oo+ B',
+//
+// a sum. So where C is lost in the rounding noise of the prediction its pivots are raised to that
+// noise, which adds what the format cannot resolve, and the sum is formed anew.
+#pragma once
+
+#include "auvest/math/linear_algebra.hpp"
+#include "auvest/math/select.hpp"
+#include "auvest/types.hpp"
+
+namespace auvest {
+inline namespace AUVEST_INSTRUCTIONS {
+
+/// The variances of the states from O on, before an update.
+template <int O, class Value, int N>
+AUVEST_INLINE Vector<Value, N - O> unseen_variances(const Matrix<Value, N, N>& P) {
+  Vector<Value, N - O> variances;
+  AUVEST_UNROLL
+  for (int i = O; i < N; ++i) variances(i - O) = P(i, i);
+  return variances;
+}
+
+namespace detail {
+
+template <int O, class Value, int N, int U>
+AUVEST_COLD void raise_lost_pivots(const Vector<Value, U>& before, const Matrix<Value, U, O>& slope,
+                                   Matrix<Value, N, N>& P) {
+  using math::larger;
+  using math::select;
+  // The noise of the dozen roundings behind an element.
+  const Value noise = Value(16) * math::machine_epsilon<Value>();
+  Matrix<Value, U, U> l;  // of C = L D L', D on the diagonal
+  Vector<Value, U> inverse;
+  math::Mask<Value> lost = Value(1) < Value(0);
+  for (int i = 0; i < U; ++i) {
+    for (int j = 0; j <= i; ++j) {
+      Value c = math::minus_dot(P(O + i, O + j), &P(O + i, 0), &slope(j, 0), O);
+      for (int k = 0; k < j; ++k) c = c - l(i, k) * l(k, k) * l(j, k);
+      l(i, j) = i == j ? c : Value(c * inverse(j));
+    }
+    const Value least = noise * before(i);
+    lost = lost || l(i, i) < least;
+    l(i, i) = larger(least, l(i, i));
+    const math::Mask<Value> there = l(i, i) > Value(0);  // not so for masters that were not added
+    inverse(i) = select(there, Value(1) / select(there, l(i, i), Value(1)), Value(0));
+  }
+  for (int i = 0; i < U; ++i) {
+    for (int j = 0; j <= i; ++j) {
+      Value p = math::dot(&P(O + i, 0), &slope(j, 0), O);
+      for (int k = 0; k <= j; ++k) {
+        p = p + (k == i ? l(k, k) : Value(l(i, k) * l(k, k))) * (k == j ? Value(1) : l(j, k));
+      }
+      P(O + i, O + j) = select(lost, p, P(O + i, O + j));
+    }
+  }
+}
+
+}  // namespace detail
+
+/// After the update of a covariance with the variances `before` by what its first O states are
+/// seen: `slope` is B of math::factor_leading(), of P the lower triangle is read. No bit changes
+/// where nothing was lost.
+template <int O, class Value, int N, int U>
+AUVEST_INLINE void keep_definite(const Vector<Value, U>& before, const Matrix<Value, U, O>& slope,
+                                 Matrix<Value, N, N>& P) {
+  static_assert(U == N - O, "the states that are not seen");
+  using math::any;
+  math::Mask<Value> shrunk = Value(4) * before(0) > Value(5) * P(O, O);
+  AUVEST_UNROLL
+  for (int i = 1; i < U; ++i) shrunk = shrunk || Value(4) * before(i) > Value(5) * P(O + i, O + i);
+  if (any(shrunk)) detail::raise_lost_pivots<O>(before, slope, P);
+}
+
+/// Raises the variances of a covariance (lower triangle) by what its pivots lack to be more than
+/// rounding noise. For slave and masters whose common drift is so large that what is known of one
+/// relative to the other lies in the last digits.
+template <class Scalar, int N>
+AUVEST_COLD void raise_pivots(Matrix<Scalar, N, N>& P) {
+  const Scalar noise = Scalar(16) * math::machine_epsilon<Scalar>();
+  Matrix<Scalar, N, N> l;  // P = L D L', D on the diagonal
+  for (int i = 0; i < N; ++i) {
+    for (int j = 0; j <= i; ++j) {
+      Scalar c = P(i, j);
+      for (int k = 0; k < j; ++k) c = c - l(i, k) * l(k, k) * l(j, k);
+      const bool there = l(j, j) > Scalar(0);  // not so for masters that were not added
+      l(i, j) = i == j ? c : there ? Scalar(c / l(j, j)) : Scalar(0);
+    }
+    const Scalar lack = noise * P(i, i) - l(i, i);
+    if (lack > Scalar(0)) {
+      P(i, i) = P(i, i) + lack;
+      l(i, i) = l(i, i) + lack;
+    }
+  }
+}
+
+}  // namespace AUVEST_INSTRUCTIONS
+}  // namespace auvest

@@ -1,0 +1,1 @@
+"""SLAT filters that know how far off they are, and come back."""
