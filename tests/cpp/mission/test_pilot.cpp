@@ -377,5 +377,5 @@ TEST_CASE_TEMPLATE("pilot: the desired point moves on, and at the end nobody is 
 }
 
 TEST_CASE("pilot: a float pilot takes what was promised") {
-  CHECK(sizeof(auvest::Pilot<float>) <= 1760);
+  CHECK(sizeof(auvest::Pilot<float>) <= 1920);
 }
