@@ -202,7 +202,7 @@ class SlatFilter {
     const Scalar here = math::sqrt(extent.square[0]);
     const Scalar there = here + dt * math::sqrt(extent.square[1]) +
                          Scalar(0.5) * dt * dt * math::sqrt(extent.square[2]);
-    const Scalar most = math::sqrt(Scalar(1e-8) * std::numeric_limits<Scalar>::max());
+    const Scalar most = math::sqrt(Scalar(1e-8) * (std::numeric_limits<Scalar>::max)());
     return there + way * (Scalar(1) + here) <= most &&
            math::sqrt(noise) * (hours * hours) * (Scalar(1) + speed) <= most;
   }
