@@ -123,9 +123,13 @@ class NewFolder:
         OSError
             If it cannot be done; ``part`` stays for :meth:`discard`.
         """
+        from concurrent.futures import ThreadPoolExecutor  # here, because it is slow to import
+
         _write_manifest(self.part, self._command, "interrupted" if interrupted else "whole")
-        for found in (*self.part.rglob("*"), self.part):
-            _to_disk(found)
+        # Together, because the disk then does them at once.
+        found = [*self.part.rglob("*"), self.part]
+        with ThreadPoolExecutor(min(16, len(found))) as pool:
+            list(pool.map(_to_disk, found))
         with HeldInterrupts() as held, held:
             try:
                 ours = self._require_ours()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -45,7 +44,8 @@ def nees(
     Returns
     -------
     ndarray, shape (...)
-        Chi-square with k degrees of freedom for a consistent filter; NaN where an input is.
+        Chi-square with k degrees of freedom for a consistent filter; NaN where an input is, and
+        where P is singular, as that of a start which is known exactly.
 
     Raises
     ------
@@ -58,7 +58,8 @@ def nees(
         raise ValueError(
             f"error has shape {e.shape} and P {p.shape}; expected (..., k) and (..., k, k)"
         )
-    known: Any = np.isfinite(e).all(axis=-1) & np.isfinite(p).all(axis=(-2, -1))
+    known = np.asarray(np.isfinite(e).all(axis=-1) & np.isfinite(p).all(axis=(-2, -1)))
+    known[known] = np.linalg.slogdet(p[known])[0] != 0  # by the pivots that solve divides by
     solved = np.linalg.solve(p[known], e[known][..., np.newaxis])[..., 0]
     result = np.full(e.shape[:-1], np.nan)
     result[known] = (e[known] * solved).sum(axis=-1)

@@ -455,7 +455,14 @@ void attack_slat(Bytes& bytes, const char* name, std::size_t storage, double sla
     if (what == 8) {
       twin.reset(new Twin(storage, make));
       say("restore");
-      if (!restore(twin->filter, before)) broken("a saved state is refused", name);
+      if (!restore(twin->filter, before)) {
+        for (std::size_t i = 0; i < before.numbers.size(); ++i) {
+          say("state[%zu] = %.9g", i, double(before.numbers[i]));
+        }
+        no_belief("a saved state is refused", {}, name);
+        twin.reset();
+        continue;
+      }
       twin_random = random;
       continue;
     }

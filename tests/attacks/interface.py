@@ -9,6 +9,7 @@ refused has changed nothing. After one that was not, all numbers are finite and 
 from __future__ import annotations
 
 import copy
+import inspect
 import math
 import pickle
 import random
@@ -207,6 +208,8 @@ class Calls:
         if entry.cls == "SlatfJoint":
             options["kept"] = v.positive(1)
             options["max_masters"] = rng.choice(("1", "2"))
+            if "covariance" in inspect.signature(auvest.SlatfJoint).parameters:
+                options["covariance"] = rng.choice(("'shared'", "'particle'"))
         arguments = ", ".join(f"{name}={value}" for name, value in options.items())
         made = f"{entry.cls}({v.vector(n, 20)}, {v.covariance(n)}, {arguments})"
         calls = self.repeated(lambda: self.slat_call(n))

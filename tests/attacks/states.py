@@ -64,8 +64,10 @@ def drive(f: Any, rows: range) -> None:
         return
     for k in rows:
         f.predict(0.5, [4, 0.2])
-        if f._core_steps.masters > 0 or f._births:
+        if f._births:
             f.update([300 + k, -1.6], auvest.UNKNOWN_MASTER)
+        elif f._core_steps.masters > 0:
+            f.update([300 + k, -1.6], 0)
 
 
 @cache

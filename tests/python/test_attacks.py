@@ -155,7 +155,7 @@ def test_the_attack_on_importers_sees_an_exception(monkeypatch, capsys):
     capsys.readouterr()
 
 
-@pytest.mark.parametrize("kind", [auvest.Slatf, auvest.EkfSlat, auvest.SlatfJoint])
+@pytest.mark.parametrize("kind", [auvest.Slatf, auvest.EkfSlat])
 def test_an_echo_beside_a_missing_one_needs_a_master(kind):
     """Refused like the echo alone; the two ways of reading arguments had disagreed."""
     f = kind([0, 0], np.eye(2))

@@ -81,6 +81,18 @@ def test_slices_do_not_change_a_bit(
         assert sliced[name].tobytes() == whole[name].tobytes(), name
 
 
+def test_an_echo_at_the_very_beginning_is_heard() -> None:
+    """It belongs to no reading that is over; it is an update before the first."""
+    moves = np.arange(4.0), np.tile([1.0, 0.1], (3, 1))
+    at_once = slave().run(*moves, z=[[110.0, 3.6], [111.0, 3.6]], z_time_s=[0.0, 2.0])
+    before = slave()
+    before.update([110.0, 3.6])
+    assert before.log_likelihood != 0.0
+    after = before.run(*moves, z=[[111.0, 3.6]], z_time_s=[2.0])
+    for name in after.columns:
+        assert after[name].tobytes() == at_once[name].tobytes(), name
+
+
 @pytest.mark.parametrize(
     ("filter_", "run"),
     [

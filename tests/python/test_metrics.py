@@ -27,6 +27,14 @@ def test_nees_of_known_vectors():
         metrics.nees(error, p[0])
 
 
+def test_nees_is_nan_where_the_covariance_is_singular():
+    """The start of a craft that is known exactly; the rows behind it have their values."""
+    p = np.stack([np.zeros((2, 2)), np.eye(2), [[1.0, 1.0], [1.0, 1.0]], 4e-200 * np.eye(2)])
+    error = np.array([[1.0, 1.0], [1.0, 1.0], [1.0, 1.0], [1e-100, 1e-100]])
+    np.testing.assert_allclose(metrics.nees(error, p), [np.nan, 2.0, np.nan, 0.5])
+    assert np.isnan(metrics.nees([1.0, 2.0], np.zeros((2, 2))))
+
+
 def test_nees_is_nan_where_an_input_is_not_finite():
     p = np.array([np.eye(2), np.diag([np.inf, 1.0]), np.diag([np.nan, 1.0]), np.eye(2)])
     value = metrics.nees([[1.0, 2.0], [1.0, 2.0], [1.0, 2.0], [np.inf, 2.0]], p)

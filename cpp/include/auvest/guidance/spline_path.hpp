@@ -195,7 +195,8 @@ class SplinePath {
 
     static void tangent(const Point* points, std::uint16_t count, std::uint16_t i,
                         Scalar (&tangent)[2]) {
-      Scalar before[2], after[2];
+      Scalar before[2] = {Scalar(0), Scalar(0)};
+      Scalar after[2] = {Scalar(0), Scalar(0)};
       const bool first = i == 0;
       const bool last = i + 1 == count;
       const Scalar h0 = first ? Scalar(0) : between(points[i - 1], points[i], before);

@@ -113,7 +113,7 @@ class Safeguards {
     const Scalar dy = place(1) - master.place(1);
     const bool one_vehicle = dx * dx + dy * dy <= reach * reach;
     if (master.refusals != 0 && !one_vehicle) master.refusals = 0;
-    master.refusals = static_cast<std::uint16_t>(master.refusals << 1 | 1u);
+    master.refusals = static_cast<std::uint16_t>(unsigned(master.refusals) << 1 | 1u);
     master.place = place;
     master.since_refusal_s = Scalar(0);
     int count = 0;

@@ -15,7 +15,6 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from auvest.logs.write import write_file
 from auvest.replay import Settings, settings_from
 
 Rows: TypeAlias = npt.NDArray[np.floating[Any]]
@@ -250,10 +249,10 @@ KINDS: Mapping[str, Kind] = {
 
 
 def write(folder: Path, files: Files) -> None:
-    """Write the files of a log."""
+    """Write the files of a log, with whatever was done to them: no writer of logs would."""
+    folder.mkdir(parents=True, exist_ok=True)
     for name, columns in files.items():
-        plain = {
-            column: values.astype(int) if column == "source" else values
-            for column, values in columns.items()
-        }
-        write_file(folder, name, **plain)
+        header = ",".join(columns)
+        form = ["%d" if column == "source" else "%.17g" for column in columns]
+        rows = np.column_stack(list(columns.values()))
+        np.savetxt(folder / name, rows, form, ",", header=header, comments="")
