@@ -36,7 +36,7 @@ class DeadReckoning : public SlatFilter<Motion_, 0> {
     }
     const Status status = check_slave(pose);
     if (status != Status::kOk) return status;
-    this->start(Frame::noise_of_an_hour(motion_, NoMaster()));
+    this->start(Frame::template noise_of_an_hour<true>(motion_, NoMaster()));
     pose_ = pose;
     return Status::kOk;
   }

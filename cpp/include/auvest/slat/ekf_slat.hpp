@@ -106,7 +106,7 @@ class EkfSlat : public SlatFilter<Motion_, Masters, Safeguards_> {
       if (params_.consider) Model::put(slave, 0, belief);
       nis = nis + score.nis;
       log_likelihood = log_likelihood + score.log_density - Frame::density_constant();
-      if (known == kUnknownMaster) continue;
+      if (!Safeguards_::kActive || known == kUnknownMaster) continue;
       if (!(params_.gate > Scalar(0) && score.nis > params_.gate)) {
         safeguards.accepted(known);
       } else {
@@ -114,7 +114,7 @@ class EkfSlat : public SlatFilter<Motion_, Masters, Safeguards_> {
                                        sonar.params, params_);
       }
     }
-    for (int s = 0; s < count && s < Masters; ++s) {
+    for (int s = 0; Safeguards_::kActive && s < count && s < Masters; ++s) {
       if (!reborn[s]) continue;
       Model::give_rebirth(echoes[s].z, echoes[s].master, sonar, params_, belief);
       safeguards.reborn(echoes[s].master);

@@ -354,15 +354,26 @@ struct SlatfParticle {
   template <class Group, class V>
   static AUVEST_INLINE void count_saturated(const Numbers<Group>& particle, const Update& update,
                                             int s, const V& nis) {
+    using math::any;
     if (!Watched || Proposal::kInformed || !(update.params.gate > Scalar(0))) return;
     if (update.echoes[s].master == kUnknownMaster) return;
+    const auto beyond = !(nis < V(update.params.gate));
+    if (s == 0) {
+      update.refused->template add<Group>(s, beyond, particle.set.log_weights() + particle.i);
+    } else if (any(beyond)) {
+      count_number(particle, update, s, beyond);
+    }
+  }
+
+  template <class Group, class Mask>
+  static AUVEST_COLD void count_number(const Numbers<Group>& particle, const Update& update, int s,
+                                       Mask beyond) {
     const Scalar equal = -math::log(Scalar(particle.set.size()));
     Scalar number[Group::kParticles];
     for (int k = 0; k < Group::kParticles; ++k) {
       number[k] = particle.i + k < particle.set.size() ? equal : no_log_weight<Scalar>();
     }
-    update.refused->template add<Group>(s, !(nis < V(update.params.gate)),
-                                        s == 0 ? particle.set.log_weights() + particle.i : number);
+    update.refused->template add<Group>(s, beyond, number);
   }
 
   template <class Group, class V>
