@@ -21,7 +21,7 @@ from auvest.logs.importers import IMPORTERS
 from auvest.logs.write import write_file
 from auvest.replay import Settings, find_settings, replay, settings_from
 from auvest.replay.checks import Checked, check
-from auvest.replay.health import Residuals, health, truncated_moments
+from auvest.replay.health import RECOVERIES_NOT_TRUSTED, Residuals, health, truncated_moments
 from auvest.replay.health import findings as health_findings
 from auvest.replay.tables import Batch, blank_measurements
 from auvest.reproduce.mistakes import measure
@@ -272,7 +272,7 @@ def test_recoveries_again_and_again_are_not_trusted(tmp_path: Path) -> None:
     write(tmp_path, files)
     checked = check(tmp_path, KINDS["beacons"].settings)
     assert checked.health is not None
-    assert checked.health.recoveries > 20
+    assert checked.health.recoveries >= RECOVERIES_NOT_TRUSTED
     (told,) = [one for one in checked.findings if one.cause == "recoveries"]
     assert told.verdict == checked.verdict == "not_trusted"
     assert "range_scale" in measure.causes(checked)

@@ -34,8 +34,9 @@ FEW = 12
 BEYOND_DOUBTFUL, BEYOND_NOT_TRUSTED = 0.25, 0.4
 #: Mean NIS within three sigma over that of a consistent filter: its sigmas are too small.
 NIS_DOUBTFUL = 1.9
-#: Recoveries from lock-out, at least so many and at least in this share of the measurements.
-RECOVERIES_DOUBTFUL, RECOVERIES_NOT_TRUSTED, RECOVERY_SHARE = 2, 8, 0.02
+#: Recoveries from lock-out, at least so many and at least in this share of the measurements; the
+#: recovery itself does no more, in the long run, than one in fifty.
+RECOVERIES_DOUBTFUL, RECOVERIES_NOT_TRUSTED, RECOVERY_SHARE = 2, 8, 0.01
 #: Share of a source beyond three sigma that makes it stand apart from the others, and how many
 #: times more it is than theirs.
 SOURCE_OFF, SOURCE_TIMES = 0.45, 3.0
