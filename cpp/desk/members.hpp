@@ -33,6 +33,10 @@ typename Model::Scalar a_time();
 AUVEST_TYPE_OF(TypeOfF, a_model<Model>().f(a_state<Model>(), a_time<Model>()))
 AUVEST_TYPE_OF(TypeOfPhi, a_model<Model>().Phi(a_state<Model>(), a_time<Model>()))
 AUVEST_TYPE_OF(TypeOfQ, a_model<Model>().Q(a_time<Model>()))
+AUVEST_TYPE_OF(TypeOfQMember, &Model::Q)
+AUVEST_TYPE_OF(
+    TypeOfAddNoise,
+    (a_model<Model>().add_noise(std::declval<typename Model::Covariance&>(), a_time<Model>()), 0))
 AUVEST_TYPE_OF(TypeOfH, a_model<Model>().h(a_state<Model>()))
 AUVEST_TYPE_OF(TypeOfJacobian, a_model<Model>().H(a_state<Model>()))
 AUVEST_TYPE_OF(TypeOfR, a_model<Model>().R())
@@ -129,7 +133,12 @@ struct CheckProcess {
                 "Scalar dt) const");
   static_assert(HasSize<F, kStates, 1>::value,
                 "f(x, dt) of your model must give a State, a Vector<Scalar, N>");
-  static_assert(!std::is_void<Noise>::value,
+  // The default Q is made by add_noise.
+  using Inherited = typename Process::Covariance (
+      ProcessModel<Process, typename Process::Scalar, kStates>::*)(typename Process::Scalar) const;
+  static_assert(!std::is_void<Noise>::value &&
+                    (!std::is_void<typename TypeOfAddNoise<Process>::Type>::value ||
+                     !std::is_same<Inherited, typename TypeOfQMember<Process>::Type>::value),
                 "your model has no Q(dt): Covariance Q(Scalar dt) const");
   static_assert(HasSize<Noise, kStates, kStates>::value,
                 "Q(dt) of your model must give a Covariance, a Matrix<Scalar, N, N>");

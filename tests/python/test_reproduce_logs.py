@@ -175,7 +175,7 @@ def made_up_recordings(data: Path) -> Path:
     table(hat / "leader_ranges.csv", "t,leader_x,leader_y,leader_pos_var,range",
           [(k, k + 3, 40, 0.25, np.hypot(3, 40) + 1e-6 * k) for k in t])  # fmt: skip
     table(hat / "groundtruth.csv", "t,x,y,theta", [(*row, 0) for row in track])
-    table(uwb / "odometry.csv", "t,v,w", [(0, 1, 0)])
+    table(uwb / "odometry.csv", "t,v,w", [(k, 1, 0) for k in range(0, 41, 10)])
     table(uwb / "ranges.csv", "t,module,range,module_x,module_y",
           [(k, s, r, *places[s]) for k, s, r in zip(t, sources, ranges, strict=True)])  # fmt: skip
     table(uwb / "groundtruth.csv", "t,x,y", track)

@@ -61,7 +61,8 @@ def test_every_run_draws_its_own_and_the_same_again():
 
 def test_the_start_is_a_draw_from_the_belief():
     """A first step of no time, and a fix that says next to nothing: the error is that of x0."""
-    blind = auvest.RangeBearing(station=(0.0, 0.0), sigma_range_m=1e6, sigma_bearing_rad=1e3)
+    # 50 m away: ten of its sigmas, so that no range is below 0.
+    blind = auvest.RangeBearing(station=(0.0, 0.0), sigma_range_m=5.0, sigma_bearing_rad=1e3)
     tilted = P0.copy()
     tilted[0, 2] = tilted[2, 0] = 0.018  # a correlation of 0.9 between x and its velocity
 

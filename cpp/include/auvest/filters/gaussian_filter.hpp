@@ -62,7 +62,10 @@ class GaussianFilter {
     if (check() != Status::kOk) return check();
     if (!math::all_finite(saved)) return Status::kNotFinite;
     Covariance p = saved.P;
-    if (!math::ldlt(p)) return Status::kNotPositiveDefinite;
+    // A pivot that is not a number makes those after it so.
+    if (!math::ldlt(p) || !math::is_finite(p(kStates - 1, kStates - 1))) {
+      return Status::kNotPositiveDefinite;
+    }
     belief_ = saved;
     ready_ = Status::kOk;
     return Status::kOk;

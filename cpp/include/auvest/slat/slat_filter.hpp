@@ -89,7 +89,8 @@ class SlatFilter {
     if (dt < Scalar(0)) return Status::kTimeBackwards;
     if (dt > longest_step_s) return Status::kStepTooLong;
     if (!plan_finite(changes, masters)) return Status::kNotFinite;
-    Scalar speed = math::absolute(u(0));
+    // A heading is no speed, but one as large as this is none either.
+    Scalar speed = math::larger(math::absolute(u(0)), math::absolute(u(1)));
     for (int n = 0; changes != nullptr && n < masters; ++n) {
       for (int axis = 0; axis < 2; ++axis) {
         speed = math::larger(speed, math::absolute(changes[n](axis)));
