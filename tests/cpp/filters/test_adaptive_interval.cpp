@@ -2,6 +2,7 @@
 #include <doctest/doctest.h>
 
 #include <cmath>
+#include <functional>
 
 #include "auvest/filters/aukf.hpp"
 #include "auvest/intervals/covariance_budget.hpp"
@@ -116,13 +117,13 @@ TEST_CASE("adaptive interval: what cannot go on is not restored, and changes not
 TEST_CASE("adaptive interval: a memory that no step leaves behind is not restored") {
   Law filter = after_a_step();
   const Law before = filter;
-  const auto refuses = [&](auto damage) {
+  using Memory = Law::Policy::Memory;
+  const auto refuses = [&](const std::function<void(Memory&)>& damage) {
     Law::Policy policy = before.policy();
     damage(policy.memory);
     CHECK(filter.restore(filter.belief(), policy, 0.5) == Status::kBadParameter);
     CHECK(same(filter, before));
   };
-  using Memory = Law::Policy::Memory;
   for (const double bad : {std::nan(""), HUGE_VAL, -HUGE_VAL}) {
     refuses([bad](Memory& m) { m.tau = bad; });
     refuses([bad](Memory& m) { m.interval = bad; });

@@ -47,6 +47,18 @@ struct SumSensor : auvest::MeasurementModel<SumSensor, double, 6, 1, 2> {
   Noise R() const { return Noise(0.04); }
 };
 
+TEST_CASE("a saved covariance whose elimination overflows is not restored") {
+  auto filter = tracker<float>(1e-3, 300, 400, 4);
+  const auto before = filter;
+  auto saved = filter.belief();
+  saved.P.diagonal() << 0.28f, 0.19f, 4e-4f, 4e-4f, 8e-5f, 8e-5f;
+  REQUIRE(filter.restore(saved) == Status::kOk);
+  filter = before;
+  saved.P(4, 0) = 1e38f;
+  CHECK(filter.restore(saved) == Status::kNotPositiveDefinite);
+  CHECK(same_belief(filter, before));
+}
+
 TEST_CASE("UKF: second-order mean of the range, in closed form") {
   // E|D + e| for e ~ N(0, s^2 I), s << |D|: |D| + s^2 / (2 |D|) + O(s^4). The transform is exact to
   // second order for every alpha, so the innovation of z = |D| is -s^2 / (2 |D|).

@@ -172,6 +172,16 @@ TEST_CASE("SLAT: a prediction whose result would not be finite is refused") {
   check_large_numbers<Shared>();
 }
 
+TEST_CASE("dead reckoning: a yaw rate beyond all numbers is refused") {
+  auvest::DeadReckoning<auvest::UnicycleMotion<float>> reckoning((auvest::UnicycleMotion<float>()));
+  Random random(1);
+  REQUIRE(reckoning.reset({Vector<float, 3>::Zero(), Matrix<float, 3, 3>::Zero()}, random) ==
+          Status::kOk);
+  CHECK(reckoning.predict(1.83f, Vector<float, 2>(-0.42f, 3e38f), random) == Status::kOverflow);
+  CHECK(reckoning.slave().x == Vector<float, 3>::Zero());
+  CHECK(reckoning.predict(1.83f, Vector<float, 2>(-0.42f, 0.3f), random) == Status::kOk);
+}
+
 TEST_CASE("Outage: a first prediction that is refused leaves communication up") {
   Ekf filter(good_odometry(), Master<float>());
   auvest::Outage<Ekf, 1> outage(filter);
