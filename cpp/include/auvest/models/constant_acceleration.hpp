@@ -108,8 +108,29 @@ struct ConstantAcceleration : ProcessModel<ConstantAcceleration<Scalar_, Order>,
                : Status::kBadParameter;
   }
 
+  /// Adds Q(dt) to a lower triangle.
+  template <class Value>
+  AUVEST_INLINE void add_noise(Matrix<Value, 6, 6>& p, Scalar dt) const {
+    const Scalar q_v = params.velocity;
+    const Scalar q_a = params.acceleration;
+    const Scalar dt2 = dt * dt;
+    const Scalar pp = position_noise(dt);
+    const Scalar vv = Order == 1 ? q_v * dt : dt * (q_v + dt2 * (q_a / Scalar(3)));
+    const Scalar aa = q_a * dt;
+    add_to_pair(&p(0, 0), pp);
+    add_to_pair(&p(2, 2), vv);
+    add_to_pair(&p(4, 4), aa);
+    if (Order == 2) {
+      AUVEST_UNROLL
+      for (int i = 0; i < 2; ++i) {
+        p(i + 2, i) = p(i + 2, i) + dt2 * (q_v / Scalar(2) + dt2 * (q_a / Scalar(8)));
+        p(i + 4, i) = p(i + 4, i) + dt2 * dt * (q_a / Scalar(6));
+        p(i + 4, i + 2) = p(i + 4, i + 2) + dt2 * (q_a / Scalar(2));
+      }
+    }
+  }
+
  private:
-  friend Base;
   struct Coefficients {
     Scalar first;   // dt
     Scalar second;  // dt^2 / 2
@@ -151,27 +172,6 @@ struct ConstantAcceleration : ProcessModel<ConstantAcceleration<Scalar_, Order>,
   static AUVEST_OUTLINE AUVEST_INLINE void add_to_pair(Value* diagonal, Scalar variance) {
     diagonal[0] = diagonal[0] + variance;
     diagonal[7] = diagonal[7] + variance;
-  }
-
-  template <class Value>
-  AUVEST_INLINE void add_noise(Matrix<Value, 6, 6>& p, Scalar dt) const {
-    const Scalar q_v = params.velocity;
-    const Scalar q_a = params.acceleration;
-    const Scalar dt2 = dt * dt;
-    const Scalar pp = position_noise(dt);
-    const Scalar vv = Order == 1 ? q_v * dt : dt * (q_v + dt2 * (q_a / Scalar(3)));
-    const Scalar aa = q_a * dt;
-    add_to_pair(&p(0, 0), pp);
-    add_to_pair(&p(2, 2), vv);
-    add_to_pair(&p(4, 4), aa);
-    if (Order == 2) {
-      AUVEST_UNROLL
-      for (int i = 0; i < 2; ++i) {
-        p(i + 2, i) = p(i + 2, i) + dt2 * (q_v / Scalar(2) + dt2 * (q_a / Scalar(8)));
-        p(i + 4, i) = p(i + 4, i) + dt2 * dt * (q_a / Scalar(6));
-        p(i + 4, i + 2) = p(i + 4, i + 2) + dt2 * (q_a / Scalar(2));
-      }
-    }
   }
 };
 

@@ -66,20 +66,7 @@ struct ConstantVelocity : ProcessModel<ConstantVelocity<Scalar_>, Scalar_, 6> {
                : Status::kBadParameter;
   }
 
- private:
-  friend Base;
-  using Motion = WhiteAcceleration<Scalar, 2>;
-
-  /// What is left of the acceleration: nothing, but all of it where no time passes.
-  static Scalar memory(Scalar dt) { return Scalar(dt > Scalar(0) ? 0 : 1); }
-
-  template <class Value>
-  static AUVEST_INLINE void shift(Vector<Value, 6>& x, Scalar dt) {
-    Motion::shift(x, dt);
-    AUVEST_UNROLL
-    for (int i = 4; i < 6; ++i) x(i) = memory(dt) * x(i);
-  }
-
+  /// Adds Q(dt) to a lower triangle.
   template <class Value>
   AUVEST_INLINE void add_noise(Matrix<Value, 6, 6>& p, Scalar dt) const {
     typename Motion::Params noise;
@@ -90,6 +77,19 @@ struct ConstantVelocity : ProcessModel<ConstantVelocity<Scalar_>, Scalar_, 6> {
     for (int i = 4; i < 6; ++i) {
       p(i, i) = p(i, i) + fresh * (params.sigma_acceleration_m_s2 * params.sigma_acceleration_m_s2);
     }
+  }
+
+ private:
+  using Motion = WhiteAcceleration<Scalar, 2>;
+
+  /// What is left of the acceleration: nothing, but all of it where no time passes.
+  static Scalar memory(Scalar dt) { return Scalar(dt > Scalar(0) ? 0 : 1); }
+
+  template <class Value>
+  static AUVEST_INLINE void shift(Vector<Value, 6>& x, Scalar dt) {
+    Motion::shift(x, dt);
+    AUVEST_UNROLL
+    for (int i = 4; i < 6; ++i) x(i) = memory(dt) * x(i);
   }
 };
 

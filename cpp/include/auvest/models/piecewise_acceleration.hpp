@@ -50,14 +50,7 @@ struct PiecewiseAcceleration : ProcessModel<PiecewiseAcceleration<Scalar_>, Scal
     return valid ? Status::kOk : Status::kBadParameter;
   }
 
- private:
-  friend Base;
-  static AUVEST_INLINE ExactAcceleration<Scalar> noiseless() {
-    AccelerationNoise<Scalar> none;
-    none.position = none.velocity = none.acceleration = Scalar(0);
-    return ExactAcceleration<Scalar>(none);
-  }
-
+  /// Adds Q(dt) to a lower triangle.
   template <class Value>
   AUVEST_INLINE void add_noise(Matrix<Value, 6, 6>& p, Scalar dt) const {
     const Scalar g[3] = {Scalar(0.5) * dt * dt * params.acceleration_m_s2,
@@ -74,6 +67,13 @@ struct PiecewiseAcceleration : ProcessModel<PiecewiseAcceleration<Scalar_>, Scal
         }
       }
     }
+  }
+
+ private:
+  static AUVEST_INLINE ExactAcceleration<Scalar> noiseless() {
+    AccelerationNoise<Scalar> none;
+    none.position = none.velocity = none.acceleration = Scalar(0);
+    return ExactAcceleration<Scalar>(none);
   }
 };
 

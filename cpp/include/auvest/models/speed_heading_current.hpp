@@ -87,8 +87,19 @@ struct SpeedHeadingCurrent : ProcessModel<SpeedHeadingCurrent<Scalar_>, Scalar_,
                : Status::kBadParameter;
   }
 
+  /// Adds Q(dt) to a lower triangle.
+  template <class Value>
+  AUVEST_INLINE void add_noise(Matrix<Value, 4, 4>& p, Scalar dt) const {
+    const Scalar walk = params.current * dt;
+    AUVEST_UNROLL
+    for (int i = 0; i < 2; ++i) {
+      p(i, i) = p(i, i) + Value(position_noise(dt));
+      p(i + 2, i) = p(i + 2, i) + Value(walk * dt / Scalar(2));
+      p(i + 2, i + 2) = p(i + 2, i + 2) + Value(walk);
+    }
+  }
+
  private:
-  friend Base;
   template <class Value>
   AUVEST_INLINE void move(Vector<Value, 4>& x, Scalar dt) const {
     Scalar sine, cosine;
@@ -100,17 +111,6 @@ struct SpeedHeadingCurrent : ProcessModel<SpeedHeadingCurrent<Scalar_>, Scalar_,
 
   Scalar position_noise(Scalar dt) const {
     return dt * (params.position + params.current * dt * dt / Scalar(3));
-  }
-
-  template <class Value>
-  AUVEST_INLINE void add_noise(Matrix<Value, 4, 4>& p, Scalar dt) const {
-    const Scalar walk = params.current * dt;
-    AUVEST_UNROLL
-    for (int i = 0; i < 2; ++i) {
-      p(i, i) = p(i, i) + Value(position_noise(dt));
-      p(i + 2, i) = p(i + 2, i) + Value(walk * dt / Scalar(2));
-      p(i + 2, i + 2) = p(i + 2, i + 2) + Value(walk);
-    }
   }
 };
 
