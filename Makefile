@@ -123,12 +123,12 @@ test-python: install-editable ## the Python tests
 test-firmware: install-editable ## the library, the sketches on the simulated board, parity
 	$(PY) -m pytest tests/firmware tests/parity
 
-test-cpp: build-release ## the C++ tests, optimised, with the examples
+test-cpp: build-release ## the C++ tests that run for seconds, optimised, and the examples
 	ctest --test-dir build/release --parallel 2
 
-# The other compiler and the newest standard, under the address and undefined-behaviour sanitizers;
-# build-release has gcc and C++11, the Python module C++17. (Any pair has a target; each takes
-# minutes.)
+# All of them with the other compiler and the newest standard, under the address and
+# undefined-behaviour sanitizers; build-release has gcc and C++11, the Python module C++17. (Any pair
+# has a target; each takes minutes.)
 MATRIX := matrix-clang-20
 PAIRS := $(foreach compiler,gcc clang,$(foreach std,11 14 17 20,matrix-$(compiler)-$(std)))
 test-cpp-matrix: $(MATRIX) ## the C++ tests under sanitizers: clang, C++20
@@ -144,7 +144,8 @@ $(PAIRS): matrix-%: setup-dev
 
 build-release: setup-dev
 	cmake -S . -B build/release -G Ninja --log-level=WARNING -D AUVEST_BUILD_TESTS=ON \
-	    -D AUVEST_BUILD_EXAMPLES=ON -D AUVEST_BUILD_BENCHMARKS=ON -D AUVEST_BUILD_TOOLS=ON
+	    -D AUVEST_LONG_TESTS_ONLY=ON -D AUVEST_BUILD_EXAMPLES=ON -D AUVEST_BUILD_BENCHMARKS=ON \
+	    -D AUVEST_BUILD_TOOLS=ON
 	cmake --build build/release
 
 # What libFuzzer finds goes to build/fuzz/crash-*. A long run is worth optimised code:

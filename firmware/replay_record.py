@@ -10,6 +10,7 @@ find again.
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ import numpy.typing as npt
 
 from auvest import Aukf
 from auvest.scenarios import paper_aukf
-from auvest.scenarios.tracking import Scenario, simulate
+from auvest.scenarios.tracking import Scenario, sensor_of, simulate
 
 HEADER = Path(__file__).resolve().parent / "library" / "examples" / "replay" / "record.h"
 
@@ -47,7 +48,9 @@ def record() -> tuple[Floats, Floats, Floats, Floats]:
     start, variances = filter_.x.copy(), np.diagonal(filter_.P).copy()
     result = simulate(filter_, scenario)
     rows = np.hstack([result.z[0], result.truth[0]]).astype(np.float32)
-    last = filter_.run(rows[:, :2], reference=rows[:, 2:]).x[-1]
+    # The noise is not cut off at a range of 0, as a sonar's is.
+    sonar = replace(sensor_of(filter_), smallest_range_m=-1e6)
+    last = filter_.run(rows[:, :2], sensor=sonar, reference=rows[:, 2:]).x[-1]
     if not np.array_equal(last, result.x[0, -1]):
         raise RuntimeError("the record does not give the estimates of the simulation")
     return start, variances, rows, last

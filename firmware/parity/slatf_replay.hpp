@@ -217,14 +217,15 @@ class Replay {
     show_readings(filter);
   }
 
-  template <class Motion, int Masters, class Set, class Resampling>
-  void show_readings(const ParticleSlatFilter<Motion, Masters, Set, Resampling>& filter) {
+  template <class Motion, int Masters, class Set, class Resampling, class Safeguards>
+  void show_readings(
+      const ParticleSlatFilter<Motion, Masters, Set, Resampling, Safeguards>& filter) {
     write(filter.effective_size());
     write(filter.log_likelihood());
     stream_.write(static_cast<std::uint32_t>(filter.resamplings()));
   }
-  template <class Motion, class Master, int Masters>
-  void show_readings(const EkfSlat<Motion, Master, Masters>& filter) {
+  template <class Motion, class Master, int Masters, class Safeguards>
+  void show_readings(const EkfSlat<Motion, Master, Masters, Safeguards>& filter) {
     write(filter.nis());
     write(filter.log_likelihood());
   }

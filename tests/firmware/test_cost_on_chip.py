@@ -86,7 +86,9 @@ def test_models_of_ones_own_cost_what_the_built_in_ones_do(measure, root):
     built_in = measure(process="ConstantAcceleration", sensors=["RangeBearing"], filter="aukf")
     for name, value in mine.row().items():
         if name.endswith("_bytes") or name.startswith("cycles"):
-            assert value == pytest.approx(getattr(built_in, name), rel=0.02), name
+            # The limits of a range, 4 bytes each, are what the example leaves out.
+            known = 8 if name == "static_ram_bytes" else 0
+            assert value + known == pytest.approx(getattr(built_in, name), rel=0.02), name
     assert mine.difference is built_in.difference is None
     # x, the lower triangle of P, and the interval.
     assert mine.numbers == built_in.numbers == 300 * (6 + 21 + 1)

@@ -66,7 +66,7 @@ struct Started {
     pose.x.setZero();
     pose.P.setZero();
     REQUIRE(filter->reset(pose, random) == Status::kOk);
-    auto prior = master_belief<float>(x, y, 0, 0, 1);
+    auto prior = master_belief<float>(double(x), double(y), 0, 0, 1);
     for (int i = 2; i < 6; ++i) prior.P(i, i) = i < 4 ? 0.1f : 0.01f;
     REQUIRE(filter->add_master(prior) == Status::kOk);
   }
