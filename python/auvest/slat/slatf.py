@@ -160,9 +160,10 @@ class Slatf(ParticleSlatFilter):
         return f"{super().__repr__()[:-1]}, {many})"
 
     def run(self, *args: Any, **options: Any) -> SlatRun:
-        """See :meth:`SlatFilter.run`; warns where :attr:`overconfident`."""
+        """See :meth:`SlatFilter.run`; warns where it becomes :attr:`overconfident`."""
+        before = self.overconfident
         result = super().run(*args, **options)
-        if self.overconfident:
+        if self.overconfident and not before:
             warnings.warn(
                 f"{self.resamplings} resamplings of {self.particles} particles: the covariance is "
                 "too small. Take SlatfJoint(covariance='shared'), or more particles",
