@@ -44,7 +44,8 @@ void check_plain_bits(Filter plain, const Rule& rule) {
     REQUIRE(plain.predict(Scalar(0.5)) == Status::kOk);
     REQUIRE(robust.predict(Scalar(0.5)) == Status::kOk);
     Vector<Scalar, 2> z;  // gross errors too, and the near field at times
-    z << Scalar(6.6) + Scalar(3) * random.normal<Scalar>(), Scalar(-1.1) + random.normal<Scalar>();
+    z << std::abs(Scalar(6.6) + Scalar(3) * random.normal<Scalar>()),
+        Scalar(-1.1) + random.normal<Scalar>();
     const auto a = plain.update(z, sonar);
     const auto b = robust.update(z, sonar);
     REQUIRE(a.status == Status::kOk);
