@@ -22,8 +22,10 @@ def local_origin(log: LogFolder) -> tuple[float, float] | None:
     return GRID_M * round(x / GRID_M), GRID_M * round(y / GRID_M)
 
 
-def shifted(log: LogFolder, origin: tuple[float, float]) -> LogFolder:
-    """Give the log in coordinates that count from this origin."""
+def shifted(log: LogFolder, origin: tuple[float, float] | None) -> LogFolder:
+    """Give the log in coordinates that count from this origin; None: the log itself."""
+    if origin is None:
+        return log
 
     def shift(first: int) -> Change:
         return columns_changed(

@@ -16,6 +16,7 @@ from auvest.logs.findings import VERDICTS, Finding, Verdict, finding, worst
 from auvest.logs.origin import local_origin, shifted
 from auvest.replay import diagnosis
 from auvest.replay.config import FilterName, Settings
+from auvest.replay.engine import replay_of
 from auvest.replay.health import Health, Residuals, findings, health
 
 
@@ -149,8 +150,7 @@ def _replayed(
     found: list[Finding],
 ) -> list[Finding]:
     name = filter_of(log, settings, filter_name)
-    origin = local_origin(log)
-    local = log if origin is None else shifted(log, origin)
-    for batch in diagnosis.engine(local, settings, name).batches():
+    local = shifted(log, local_origin(log))
+    for batch in replay_of(local, settings, name).batches():
         left.add(batch)
     return innovations(local, settings, name, left, found)

@@ -21,7 +21,7 @@ from auvest.logs.changed import Change, ChangedLog, HeldLog, columns_changed
 from auvest.logs.findings import Finding, finding
 from auvest.logs.reader import CsvTable, Rows
 from auvest.replay.config import FilterName, Settings
-from auvest.replay.engine import Localiser, Replay, Tracker
+from auvest.replay.engine import replay_of
 from auvest.replay.health import FEW, Residuals, numbers_measured
 from auvest.replay.sources import Sources
 from auvest.replay.tables import Columns
@@ -86,11 +86,6 @@ class Fit:
     log_likelihood: float
 
 
-def engine(log: LogFolder, settings: Settings, filter_name: FilterName) -> Replay:
-    """Make the replay that a log is for."""
-    return (Tracker if log.tracking else Localiser)(log, settings, filter_name)
-
-
 def diagnose(
     log: LogFolder, settings: Settings, filter_name: FilterName, *, gross: bool = True
 ) -> list[Finding]:
@@ -110,7 +105,7 @@ def diagnose(
     kind: FilterName = "ukf" if log.tracking else "robust-ekf"
     if filter_name in ("robust-ukf", "robust-ekf"):
         kind = filter_name
-    start = engine(log, settings, kind).start
+    start = replay_of(log, settings, kind).start
     held = HeldLog(log, LINES, start if math.isfinite(start[0]) else None)
     run = _Refits(held, settings, kind)
     as_is = run.run(Hypothesis("", {}, ""))
@@ -186,7 +181,7 @@ class _Refits:
         residuals, track = Residuals(), [np.empty((0, 3))]
         log = ChangedLog(self._log, one.changes)
         try:
-            for batch in engine(log, one.settings(self._settings), self._kind).batches():
+            for batch in replay_of(log, one.settings(self._settings), self._kind).batches():
                 residuals.add(batch)
                 columns = [batch.estimates[name] for name in ("time_s", "x_m", "y_m")]
                 track.append(np.column_stack(columns))

@@ -560,6 +560,11 @@ def _fill(
     columns["outcome"][rows] = tables.DECISIONS[updates["decision"]]
 
 
+def replay_of(log: LogFolder, settings: Settings, filter_name: FilterName) -> Replay:
+    """Make the replay that a log is for."""
+    return (Tracker if log.tracking else Localiser)(log, settings, filter_name)
+
+
 def _estimates(
     time_s: Floats, states: Floats, heading: Floats, covariance: Floats, reckoned: Floats | None
 ) -> Columns:

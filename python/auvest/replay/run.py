@@ -16,7 +16,7 @@ from auvest.logs.findings import Finding
 from auvest.logs.origin import local_origin, shifted
 from auvest.replay import checks, tables
 from auvest.replay.config import FilterName, Settings
-from auvest.replay.engine import Localiser, Replay, Tracker
+from auvest.replay.engine import replay_of
 from auvest.replay.health import Health, Residuals, health
 from auvest.replay.samples import Samples
 from auvest.replay.tally import Tally
@@ -118,8 +118,8 @@ def replay(
     """
     name = checks.filter_of(log, settings, filter_name)
     origin = local_origin(log)
-    local = log if origin is None else shifted(log, origin)
-    engine: Replay = (Tracker if log.tracking else Localiser)(local, settings, name)
+    local = shifted(log, origin)
+    engine = replay_of(local, settings, name)
     tally, residuals = Tally(), Residuals()
     found: list[Finding] = []
     estimates, errors = Samples(tables.ESTIMATES), Samples(tables.ERRORS)
