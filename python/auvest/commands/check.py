@@ -18,49 +18,27 @@ Examples
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated
-
-import typer
 from rich.table import Table
 
-from auvest.commands import options
+from auvest.commands import log_options, options
 from auvest.commands.console import Terminal, table
 from auvest.commands.version import version
 from auvest.logs.check import FileSeen
 from auvest.logs.findings import worst
-from auvest.replay import Settings, find_settings
 from auvest.replay.checks import Checked, check
-from auvest.replay.config import FilterName, packaged_settings
 
 
 def command(
-    logs: Annotated[
-        list[Path], typer.Argument(metavar="LOG...", help="Folders of logs.", show_default=False)
-    ],
-    filter_name: Annotated[
-        FilterName | None,
-        typer.Option(
-            "--filter",
-            help="The filter.",
-            show_default="that of the settings, else robust-ekf for ranges and ukf for fixes",
-        ),
-    ] = None,
-    config: Annotated[
-        str | None,
-        typer.Option(
-            help="Settings: a TOML file, or one of " + ", ".join(packaged_settings()) + ".",
-            metavar="FILE",
-            show_default="defaults; see docs/logs.md",
-        ),
-    ] = None,
+    logs: log_options.Logs,
+    filter_name: log_options.Filter = None,
+    config: log_options.Config = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
     """Check; the help text is the module's."""
     terminal = Terminal(as_json=as_json, quiet=quiet)
     with terminal.usage_errors():
-        settings = Settings() if config is None else find_settings(config)
+        settings = log_options.settings_of(config)
         for path in logs:
             if not path.is_dir():
                 raise ValueError(f"LOG: {path} is not a folder (docs/logs.md)")

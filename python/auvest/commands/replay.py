@@ -19,43 +19,24 @@ Examples
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
-import typer
 from rich.markup import escape
 
-from auvest.commands import options
+from auvest.commands import log_options, options
 from auvest.commands.console import Terminal, shown, table
 from auvest.commands.exit_codes import ExitCode
 from auvest.commands.files import write_results, write_text
 from auvest.commands.version import version
 from auvest.errors import FilterError
 from auvest.logs import LogFolder
-from auvest.replay import Result, Settings, find_settings
+from auvest.replay import Result
 from auvest.replay import replay as run_replay
-from auvest.replay.config import FilterName, packaged_settings
 
 
 def command(
-    logs: Annotated[
-        list[Path], typer.Argument(metavar="LOG...", help="Folders of logs.", show_default=False)
-    ],
-    filter_name: Annotated[
-        FilterName | None,
-        typer.Option(
-            "--filter",
-            help="The filter.",
-            show_default="that of the settings, else robust-ekf for ranges and ukf for fixes",
-        ),
-    ] = None,
-    config: Annotated[
-        str | None,
-        typer.Option(
-            help="Settings: a TOML file, or one of " + ", ".join(packaged_settings()) + ".",
-            metavar="FILE",
-            show_default="defaults; see docs/logs.md",
-        ),
-    ] = None,
+    logs: log_options.Logs,
+    filter_name: log_options.Filter = None,
+    config: log_options.Config = None,
     output: options.Output = Path("auvest-output/replay"),
     force: options.Force = False,
     as_json: options.Json = False,
@@ -64,7 +45,7 @@ def command(
     """Replay; the help text is the module's."""
     terminal = Terminal(as_json=as_json, quiet=quiet)
     with terminal.usage_errors():
-        settings = Settings() if config is None else find_settings(config)
+        settings = log_options.settings_of(config)
         folders = [LogFolder(path) for path in logs]
         names = [folder.path.resolve().name for folder in folders]
         for name in names:
