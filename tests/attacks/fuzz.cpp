@@ -29,7 +29,6 @@
 #include <map>
 #include <memory>
 #include <string>
-#include <type_traits>
 #include <vector>
 
 #include "auvest/models/piecewise_acceleration.hpp"
@@ -231,12 +230,8 @@ std::vector<Scalar> changed(const desk::Parameters& parameters, Bytes& bytes) {
 template <class Entry>
 auto made(const Entry& entry, Bytes& bytes) {
   const std::vector<Scalar> values = changed(entry.parameters, bytes);
-  if constexpr (std::is_invocable<decltype(entry.make), const Scalar*, Status&>::value) {
-    Status why;
-    return entry.make(values.data(), why);
-  } else {
-    return entry.make(values.data());
-  }
+  Status why;
+  return entry.make(values.data(), why);
 }
 
 AnyKernel<Scalar> kernel(Bytes& bytes) {
