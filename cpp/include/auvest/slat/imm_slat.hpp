@@ -337,7 +337,7 @@ class EkfSlat<Motion_, Imm<Models...>, Masters, Safeguards_>
     for (Scalar& weight : refused) weight = Scalar(0);
     for (int h = 0; h < hypotheses_; ++h) {
       Score<Scalar> score;
-      Scalar each[Masters];
+      Scalar each[Masters] = {};
       if (correct(echoes, count, sonar, belief_[h], score, each)) {
         heard = true;
         nis = nis + part(h) * score.nis;
