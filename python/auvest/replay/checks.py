@@ -101,7 +101,7 @@ def innovations(
         return shown
     named = diagnosis.diagnose(log, settings, filter_name, gross=bool(shown))
     if named:  # it explains why one source has more of it than others
-        shown = [one for one in shown if one.cause != "source_off"]
+        shown = [one for one in shown if one.cause not in ("source_off", "start_off")]
     return [*named, *shown]
 
 
