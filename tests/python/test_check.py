@@ -21,7 +21,7 @@ from auvest.logs.findings import CAUSES, worst
 from auvest.logs.importers import IMPORTERS
 from auvest.logs.write import write_file
 from auvest.replay import Settings, find_settings, replay, settings_from
-from auvest.replay.checks import Checked, check
+from auvest.replay.checks import Checked, check, files
 from auvest.replay.health import RECOVERIES_NOT_TRUSTED, Residuals, health, truncated_moments
 from auvest.replay.health import findings as health_findings
 from auvest.replay.tables import Batch, blank_measurements
@@ -309,6 +309,20 @@ def test_a_source_of_which_most_is_thrown_away_stands_apart() -> None:
     more = Residuals()
     more.add(Batch(nothing, rows, nothing, np.full(40, 50.0)))
     assert health(more, []).untrusted_s == [(0.0, 5.0)]
+
+
+@pytest.mark.parametrize(
+    ("kind", "section", "key"), [("beacons", "fixes", "every_s"), ("tracking", "ranges", "sigma_m")]
+)
+def test_settings_for_the_other_kind_of_log_are_named(
+    kind: str, section: str, key: str, tmp_path: Path
+) -> None:
+    write(tmp_path, KINDS[kind].make(np.random.default_rng(5)))
+    settings = settings_from({section: {key: 7.0}})
+    notes = [one for one in files(LogFolder(tmp_path), settings) if one.cause == "ignored_settings"]
+    assert [one.verdict for one in notes] == ["sound"]
+    assert notes[0].message.startswith(f"[{section}] of the settings is of no use here")
+    assert files(LogFolder(tmp_path), Settings()) == []
 
 
 def times(file: str, column: str, factor: float) -> Callable[[Any], None]:

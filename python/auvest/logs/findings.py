@@ -32,6 +32,7 @@ CAUSES: Mapping[str, tuple[str, Verdict]] = {
     "odometry_gap": ("odometry pauses while the craft moves", "doubtful"),
     "no_echo": ("a value that stands for 'no echo' is logged as a range", "doubtful"),
     "ignored_file": ("a file that no log has is not read", "sound"),
+    "ignored_settings": ("settings that such a log has no use for", "sound"),
     "local_origin": ("coordinates are far from (0, 0); an origin is subtracted", "sound"),
     # what innovations show
     "not_used": ("measurements that no filter was given", "doubtful"),
