@@ -69,11 +69,25 @@ AUVEST_OUTLINE bool is_far(const Belief<Scalar, N>& belief) {
          math::is_coarse(belief.x(1), belief.P(1, 1));
 }
 
-/// The same, to start from: kFarFromOrigin where the format is coarse against P.
+/// Whether sums and products of the squares of all numbers have eight digits left.
+template <class Scalar, int N>
+AUVEST_OUTLINE bool is_moderate(const Belief<Scalar, N>& belief) {
+  const Scalar most = Scalar(1e-8) * (std::numeric_limits<Scalar>::max)();
+  bool moderate = true;
+  for (int i = 0; i < N; ++i) {
+    moderate = moderate && belief.x(i) * belief.x(i) <= most && belief.P(i, i) <= most;
+  }
+  return moderate;
+}
+
+/// The same, to start from: kFarFromOrigin where the format is coarse against P, kOverflow where
+/// numbers are too large.
 template <class Scalar, int Pose>
 Status check_start(const Belief<Scalar, Pose>& pose) {
   const Status status = check_slave(pose);
-  return status == Status::kOk && is_far(pose) ? Status::kFarFromOrigin : status;
+  if (status != Status::kOk) return status;
+  if (is_far(pose)) return Status::kFarFromOrigin;
+  return is_moderate(pose) ? Status::kOk : Status::kOverflow;
 }
 
 /// A belief of a master that a filter does not have yet. Only the lower triangle of P is read.
@@ -81,6 +95,7 @@ template <class Scalar>
 Status check_newcomer(const Belief<Scalar, 6>& master) {
   if (!math::all_finite(master.x) || !math::lower_finite(master.P)) return Status::kNotFinite;
   if (is_far(master)) return Status::kFarFromOrigin;
+  if (!is_moderate(master)) return Status::kOverflow;
   return math::is_positive_definite(master.P) ? Status::kOk : Status::kNotPositiveDefinite;
 }
 
