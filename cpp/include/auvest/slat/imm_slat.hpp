@@ -325,8 +325,8 @@ class EkfSlat<Motion_, Imm<Models...>, Masters, Safeguards_>
     safeguards_.reborn(echo.master);
   }
 
-  /// False, with nothing changed, where no hypothesis could follow. `refused`, zero before: the weight
-  /// of the hypotheses to which an echo lies beyond the gate.
+  /// False, with nothing changed, where no hypothesis could follow. `refused`, zero before: the
+  /// weight of the hypotheses to which an echo lies beyond the gate.
   bool correct(const Echo<Scalar>* echoes, int count, const Sonar<Scalar>& sonar,
                Scalar (&refused)[Masters]) {
     bool heard = false;
