@@ -445,7 +445,7 @@ def _run_tracking_loop(compiled: Compiled, folder: Path) -> Row:
             if not isinstance(event, SerialLine):
                 continue
             row = reader.read(event.text)
-            if row is not None:
+            if isinstance(row, dict):
                 rows.append(row)
             if len(rows) == 60:
                 break
@@ -458,7 +458,7 @@ def _run_tracking_loop(compiled: Compiled, folder: Path) -> Row:
 
 def _run_slave_tracking(compiled: Compiled, folder: Path) -> Row:
     """Measure 20 pings of the paper's scenario: the cycles awake between two of them."""
-    reader = telemetry.Reader("SLAVE")
+    reader = telemetry.Reader()
     awake_us: list[float] = []
     readings = paper_world().readings
     with Board(compiled.elf, limit_s=120.0) as board:
@@ -466,7 +466,7 @@ def _run_slave_tracking(compiled: Compiled, folder: Path) -> Row:
             if not isinstance(event, SerialLine):
                 continue
             row = reader.read(event.text)
-            if row is not None:
+            if isinstance(row, dict):
                 awake_us.append(row["awake_us"])
             if len(awake_us) == 41:
                 break
