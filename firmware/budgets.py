@@ -25,7 +25,7 @@ import numpy as np
 
 from auvest import mission_line, telemetry
 from auvest.board import Board, BoardError, SerialLine
-from auvest.firmware.package import PackageError, package
+from auvest.firmware.package import package
 from auvest.firmware.sketch import Compiled, SketchError, compile_sketch
 from auvest.simulation import cooperative
 from auvest.simulation.paper_aukf import FilterName, paper_filter, paper_noise
@@ -735,7 +735,7 @@ def main() -> int:
     try:
         with tempfile.TemporaryDirectory() as folder:
             rows = measure(Path(folder))
-    except (BoardError, BudgetError, PackageError, SketchError, FileNotFoundError) as error:
+    except (BoardError, BudgetError, SketchError, FileNotFoundError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
     if arguments.write:
