@@ -33,6 +33,10 @@ CAUSES: Mapping[str, tuple[str, Verdict]] = {
     "no_echo": ("a value that stands for 'no echo' is logged as a range", "doubtful"),
     "ignored_file": ("a file that no log has is not read", "sound"),
     "local_origin": ("coordinates are far from (0, 0); an origin is subtracted", "sound"),
+    # what the belief shows
+    "not_converged": ("the ranges do not say where the craft is", "not_trusted"),
+    "ambiguous": ("the ranges leave several places", "not_trusted"),
+    "settling": ("the ranges leave one place, not yet confirmed", "doubtful"),
     # what innovations show
     "heading_mirrored": ("the heading, or a bearing, turns the wrong way", "not_trusted"),
     "heading_turned": ("the heading, or a bearing, counts from another axis", "not_trusted"),

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Literal, TypeAlias, get_args, get_type_hints
 
-from auvest._fields import not_negative, number, positive
+from auvest._fields import integer, not_negative, number, positive
 from auvest._outputs import is_plain_file
 
 if sys.version_info >= (3, 11):
@@ -24,22 +24,30 @@ _PACKAGED = Path(__file__).parent / "configs"
 
 @dataclass(frozen=True, kw_only=True)
 class FilterSettings:
-    """The filter: ``kernel``, ``rejections`` and ``residual`` are those of robust-ekf."""
+    """The filter: ``kernel``, ``rejections`` and ``residual`` are those of robust-ekf.
+
+    ``components`` above 1 are for a start that is not known, of ranges.
+    """
 
     kind: FilterName | None = None  # None: robust-ekf for ranges, ukf for fixes
     kernel: KernelName = "hampel"  # with the thresholds that are its defaults
     alpha: float = positive(1e-3)
     longest_step_s: float = positive(3600.0, infinite=True)
+    components: int = integer(1, 1, 255)  # 16 to 32 for a start that is not known
 
 
 @dataclass(frozen=True, kw_only=True)
 class StartSettings:
-    """Standard deviations of the belief that the run starts with."""
+    """Standard deviations of the belief that the run starts with.
+
+    ``headings`` above 1 are for a heading that is not known at all, of [filter] ``components``.
+    """
 
     sigma_position_m: float = positive(1.0)
     sigma_heading_rad: float = positive(0.1)
     sigma_speed_m_s: float = positive(0.5)
     sigma_acceleration_m_s2: float = positive(0.1)
+    headings: int = integer(1, 1, 31)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -128,11 +128,23 @@ class Residuals:
 
     def __init__(self) -> None:
         self.recoveries = 0
+        self.ranges = 0
+        self.located = 0
+        self.convergence = ""
+        self.settled_s = math.nan
         self._samples = Samples(COLUMNS, KEPT)
 
     def add(self, batch: Batch) -> None:
         """Take one batch."""
         self.recoveries += int(batch.measurements["recovered"].sum())
+        self.ranges += len(batch.located)
+        self.located += int(batch.located.sum())
+        said = batch.estimates.get("convergence", np.empty(0, "U1"))
+        if len(said):
+            self.convergence = str(said[-1])
+            settled = np.flatnonzero(said == tables.SETTLED)
+            if len(settled) and math.isnan(self.settled_s):
+                self.settled_s = float(batch.estimates["time_s"][settled[0]])
         self._samples.add({**batch.measurements, "range_m": batch.ranges_m})
 
     def rows(self) -> Columns:
@@ -208,6 +220,28 @@ def _apart(rows: Columns, within: npt.NDArray[np.bool_]) -> list[Finding]:
             )
             found.append(finding("source_off", message))
     return found
+
+
+def start_findings(residuals: Residuals) -> list[Finding]:
+    """Say whether the ranges told where the craft is."""
+    said = residuals.convergence
+    if not said and residuals.ranges > 0 and residuals.located == 0:
+        message = (
+            "no range told where the craft is: a start that is not known needs components in "
+            "[filter], 16 or 32"
+        )
+        return [finding("not_converged", message)]
+    if not said or said == tables.SETTLED:
+        return []
+    since = "it never settled"
+    if not math.isnan(residuals.settled_s):
+        since = f"it settled first at {residuals.settled_s:.6g} s"
+    texts = {
+        tables.NOT_CONVERGED: "at the end the ranges do not say where the craft is",
+        tables.AMBIGUOUS: "at the end the ranges leave several places, the estimate is between",
+        tables.SETTLING: "at the end the ranges leave one place, not yet confirmed",
+    }
+    return [finding(said.replace(" ", "_"), f"{texts[said]}; {since}")]
 
 
 def health(residuals: Residuals, found: Iterable[Finding]) -> Health:
