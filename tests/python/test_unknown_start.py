@@ -20,7 +20,7 @@ from auvest.replay import checks, read_settings
 from auvest.replay.config import settings_from
 from auvest.replay.report import html, rows, warnings
 from auvest.replay.run import replay
-from auvest.scenarios import cooperative
+from auvest.simulation import cooperative
 
 STATIONS = np.array([[0.0, 0.0], [120.0, 0.0], [60.0, 90.0]])
 KINDS = (auvest.RobustEkf, auvest.RobustUkf)
@@ -248,7 +248,7 @@ def test_wrong_arguments_are_refused_by_name():
     for message, options in {
         r"components must be 1, or at least 8: a ring of 5 has gaps": {"components": 5},
         r"components must lie in 1\.\.255, not 256": {"components": 256},
-        r"headings is for a process whose third state is theta_rad, its heading, not SpeedHeading": {
+        r"headings is for a process whose third state is theta_rad, its heading, not Speed": {
             "headings": 2
         },
         r"components is for ranges: none of sensors is a LeaderRange": {
