@@ -429,7 +429,7 @@ def test_settings_that_are_for_ranges_are_refused_for_fixes(tmp_path):
         time_s=np.arange(9.0), source=one.astype(int), range_m=20 * one, bearing_rad=0.1 * one,
     )  # fmt: skip
     write_file(folder, "beacons.csv", source=[1], x_m=[0.0], y_m=[0.0])
-    with pytest.raises(ValueError, match=r"\[filter\] components and \[start\] headings are for"):
+    with pytest.raises(ValueError, match=r"\[filter\] components and headings are for logs of"):
         replay(LogFolder(folder), unknown())
     path = tmp_path / "wrong.toml"
     path.write_text("[filter]\ncomponents = 300\n")

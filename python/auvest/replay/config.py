@@ -26,7 +26,8 @@ _PACKAGED = Path(__file__).parent / "configs"
 class FilterSettings:
     """The filter: ``kernel``, ``rejections`` and ``residual`` are those of robust-ekf.
 
-    ``components`` above 1 are for a start that is not known, of ranges.
+    ``components`` above 1 are for ranges from a start that is not known, ``headings`` above 1 for
+    one whose heading is not known either.
     """
 
     kind: FilterName | None = None  # None: robust-ekf for ranges, ukf for fixes
@@ -34,20 +35,17 @@ class FilterSettings:
     alpha: float = positive(1e-3)
     longest_step_s: float = positive(3600.0, infinite=True)
     components: int = integer(1, 1, 255)  # 16 to 32 for a start that is not known
+    headings: int = integer(1, 1, 31)  # so many start headings, of 8 components each at least
 
 
 @dataclass(frozen=True, kw_only=True)
 class StartSettings:
-    """Standard deviations of the belief that the run starts with.
-
-    ``headings`` above 1 are for a heading that is not known at all, of [filter] ``components``.
-    """
+    """Standard deviations of the belief that the run starts with."""
 
     sigma_position_m: float = positive(1.0)
     sigma_heading_rad: float = positive(0.1)
     sigma_speed_m_s: float = positive(0.5)
     sigma_acceleration_m_s2: float = positive(0.1)
-    headings: int = integer(1, 1, 31)
 
 
 @dataclass(frozen=True, kw_only=True)

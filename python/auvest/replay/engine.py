@@ -390,8 +390,8 @@ class Tracker(Replay):
     _measured = "fixes.csv"
 
     def __init__(self, log: LogFolder, settings: Settings, filter_name: FilterName) -> None:
-        if settings.filter.components > 1 or settings.start.headings > 1:
-            raise ValueError("[filter] components and [start] headings are for logs of ranges")
+        if settings.filter.components > 1 or settings.filter.headings > 1:
+            raise ValueError("[filter] components and headings are for logs of ranges")
         super().__init__(log, settings, filter_name)
         fixes = settings.fixes
         self._process = ConstantAcceleration(**vars(settings.process))
@@ -537,7 +537,7 @@ def _build(
     kind: type[GaussianFilter] = getattr(auvest, entry.cls)
     models["longest_step_s"] = settings.filter.longest_step_s
     models["components"] = settings.filter.components
-    models["headings"] = settings.start.headings
+    models["headings"] = settings.filter.headings
     if issubclass(kind, (RobustEkf, RobustUkf)):
         models["kernel"] = settings.filter.kernel
     if issubclass(kind, Ukf):
