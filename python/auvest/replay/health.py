@@ -145,6 +145,10 @@ class Residuals:
         self.recoveries = 0
         self.unused: Counter[tuple[int, str]] = Counter()  # by source and outcome
         self.lines: Counter[int] = Counter()  # by source
+        self.ranges = 0
+        self.located = 0
+        self.convergence = ""
+        self.settled_s = math.nan
         self._samples = Samples(COLUMNS, KEPT)
         self._beginning: list[Columns] = []
 
@@ -166,6 +170,14 @@ class Residuals:
             self._beginning += [
                 {name: rows[name][k : k + 1] for name in COLUMNS} for k in compared[:FEW].tolist()
             ]
+        self.ranges += len(batch.located)
+        self.located += int(batch.located.sum())
+        said = batch.estimates.get("convergence", np.empty(0, "U1"))
+        if len(said):
+            self.convergence = str(said[-1])
+            settled = np.flatnonzero(said == tables.SETTLED)
+            if len(settled) and math.isnan(self.settled_s):
+                self.settled_s = float(batch.estimates["time_s"][settled[0]])
 
     def rows(self) -> Columns:
         """Give those that were compared with a prediction."""
@@ -313,6 +325,28 @@ def _apart(rows: Columns, within: npt.NDArray[np.bool_]) -> list[Finding]:
             )
             found.append(finding("source_off", message))
     return found
+
+
+def start_findings(residuals: Residuals) -> list[Finding]:
+    """Say whether the ranges told where the craft is."""
+    said = residuals.convergence
+    if not said and residuals.ranges > 0 and residuals.located == 0:
+        message = (
+            "no range told where the craft is: a start that is not known needs components in "
+            "[filter], 16 or 32"
+        )
+        return [finding("not_converged", message)]
+    if not said or said == tables.SETTLED:
+        return []
+    since = "it never settled"
+    if not math.isnan(residuals.settled_s):
+        since = f"it settled first at {residuals.settled_s:.6g} s"
+    texts = {
+        tables.NOT_CONVERGED: "at the end the ranges do not say where the craft is",
+        tables.AMBIGUOUS: "at the end the ranges leave several places, the estimate is between",
+        tables.SETTLING: "at the end the ranges leave one place, not yet confirmed",
+    }
+    return [finding(said.replace(" ", "_"), f"{texts[said]}; {since}")]
 
 
 def health(residuals: Residuals, found: Iterable[Finding]) -> Health:
