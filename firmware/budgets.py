@@ -27,9 +27,9 @@ from auvest import mission_line, telemetry
 from auvest.board import Board, BoardError, SerialLine
 from auvest.firmware.package import PackageError, package
 from auvest.firmware.sketch import Compiled, SketchError, compile_sketch
-from auvest.scenarios import cooperative
-from auvest.scenarios.paper_aukf import FilterName, paper_filter, paper_noise
-from auvest.scenarios.tracking import Scenario, Track, simulate
+from auvest.simulation import cooperative
+from auvest.simulation.paper_aukf import FilterName, paper_filter, paper_noise
+from auvest.simulation.tracking import Scenario, Track, simulate
 from auvest.simulation.vehicle_in_the_loop import (
     PERIOD_S,
     ChipFlight,

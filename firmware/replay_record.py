@@ -17,8 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from auvest import Aukf
-from auvest.scenarios import paper_aukf
-from auvest.scenarios.tracking import Scenario, sensor_of, simulate
+from auvest.simulation import paper_aukf
+from auvest.simulation.tracking import Scenario, sensor_of, simulate
 
 HEADER = Path(__file__).resolve().parent / "library" / "examples" / "replay" / "record.h"
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from auvest import metrics as metrics
     from auvest import montecarlo as montecarlo
-    from auvest import scenarios as scenarios
+    from auvest import simulation as simulation
     from auvest._core import Decision as Decision
     from auvest._core import SelfTestPart as SelfTestPart
     from auvest._core import SelfTestResult as SelfTestResult
@@ -74,7 +74,7 @@ if TYPE_CHECKING:
 else:
     from importlib import import_module
 
-    _SUBMODULES = ("metrics", "montecarlo", "scenarios")
+    _SUBMODULES = ("metrics", "montecarlo", "simulation")
     _HOME = {
         "Aukf": "filters",
         "BodyVelocity": "models",

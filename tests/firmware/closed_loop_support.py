@@ -14,7 +14,7 @@ import pytest
 from auvest import Aukf, ConstantAcceleration, FilterError, RangeBearing, telemetry
 from auvest.board import PinChange, Report, SerialLine
 from auvest.commands.capture import TRIGGER_PIN
-from auvest.scenarios.tracking import Track
+from auvest.simulation.tracking import Track
 
 pytest_plugins = ["board_support"]
 

@@ -8,8 +8,8 @@ import pytest
 
 from auvest import ConstantAcceleration, RangeBearing, Ukf
 from auvest.firmware.sketch import SketchError
-from auvest.scenarios import paper_aukf
-from auvest.scenarios.tracking import Scenario, simulate
+from auvest.simulation import paper_aukf
+from auvest.simulation.tracking import Scenario, simulate
 from firmware import replay_record
 
 pytest_plugins = ["board_support"]

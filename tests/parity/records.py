@@ -22,8 +22,8 @@ from auvest import (
     _core,
 )
 from auvest.intervals import IntervalPolicy
-from auvest.scenarios.paper_aukf import NOISE_KINDS, paper_filter, paper_noise
-from auvest.scenarios.tracking import Scenario, Track, simulate
+from auvest.simulation.paper_aukf import NOISE_KINDS, paper_filter, paper_noise
+from auvest.simulation.tracking import Scenario, Track, simulate
 
 STATES = 6
 LOWER = np.tril_indices(STATES)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from auvest.scenarios import cooperative, slat, tracking
+from auvest.simulation import cooperative, slat, tracking
 
 
 def tracking_result(error: Any, **columns: Any) -> tracking.TrackingResult:

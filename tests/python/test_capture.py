@@ -32,7 +32,7 @@ from auvest import board, telemetry
 from auvest.cli import app
 from auvest.commands import capture
 from auvest.commands.capture import SimulatedSonar
-from auvest.scenarios.tracking import Noise, Track
+from auvest.simulation.tracking import Noise, Track
 from auvest.telemetry import LineError, Reader
 
 COLUMNS = (

@@ -19,8 +19,8 @@ from typer.testing import CliRunner, Result
 
 from auvest.cli import app
 from auvest.commands import simulate_aukf
-from auvest.scenarios.paper_aukf import paper_filter, paper_noise, paper_track
-from auvest.scenarios.tracking import Scenario, simulate
+from auvest.simulation.paper_aukf import paper_filter, paper_noise, paper_track
+from auvest.simulation.tracking import Scenario, simulate
 
 QUICK = ["--runs", "4", "--steps", "12", "--no-figure"]
 

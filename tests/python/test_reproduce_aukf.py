@@ -20,14 +20,14 @@ from auvest.commands.console import to_json
 from auvest.reproduce.aukf import claims as aukf_claims
 from auvest.reproduce.aukf import measure as aukf
 from auvest.reproduce.markdown import fill, number, table
-from auvest.scenarios.paper_aukf import (
+from auvest.simulation.paper_aukf import (
     ASSUMPTIONS,
     TrackName,
     paper_filter,
     paper_noise,
     paper_track,
 )
-from auvest.scenarios.tracking import Scenario, simulate
+from auvest.simulation.tracking import Scenario, simulate
 
 COMMITTED = Path(__file__).parents[2] / "docs" / "reproduction" / "aukf"
 FIGURES = [f"fig{number:02d}" for number in range(1, 11)]

@@ -16,7 +16,7 @@ from auvest import metrics
 from auvest.cli import app
 from auvest.reproduce.mekf import claims as mekf_page
 from auvest.reproduce.mekf import measure as mekf
-from auvest.scenarios import cooperative
+from auvest.simulation import cooperative
 
 PAGE = ROOT / "docs" / "reproduction" / "mekf"
 

@@ -25,8 +25,8 @@ from auvest.reproduce.claims import NO, YES
 from auvest.reproduce.slatf import claims as slatf_claims
 from auvest.reproduce.slatf import measure as slatf
 from auvest.reproduce.slatf.figures import FIGURES
-from auvest.scenarios import slat
-from auvest.scenarios.paper_slatf import (
+from auvest.simulation import slat
+from auvest.simulation.paper_slatf import (
     ASSUMPTIONS,
     FILTERS,
     LEVELS,

@@ -13,7 +13,7 @@ from auvest import plots
 from auvest.reproduce.slat_cases import measure as slat_cases
 from auvest.reproduce.slat_cases.figures import FIGURES
 from auvest.reproduce.slat_cases.page import page, page_of
-from auvest.scenarios.slat import SlatResult, simulate
+from auvest.simulation.slat import SlatResult, simulate
 
 PAGE = ROOT / "docs" / "reproduction" / "slat_cases"
 

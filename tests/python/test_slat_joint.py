@@ -12,8 +12,8 @@ import pytest
 import auvest
 from auvest import UNKNOWN_MASTER, EkfSlat, Outage, SlatfJoint
 from auvest.reproduce.slatf import measure as slatf
-from auvest.scenarios.paper_slatf import LEVELS, paper_filter, paper_scenario
-from auvest.scenarios.slat import simulate
+from auvest.simulation.paper_slatf import LEVELS, paper_filter, paper_scenario
+from auvest.simulation.slat import simulate
 
 Floats = npt.NDArray[np.float64]
 

@@ -15,8 +15,8 @@ import auvest
 from auvest import UNKNOWN_MASTER, DeadReckoning, EkfSlat, Outage, Slatf, SlatfJoint, Status
 from auvest.reproduce.slat_robust import measure as robust
 from auvest.reproduce.slat_robust.page import page, page_of
-from auvest.scenarios.paper_slatf import LEVELS, paper_scenario
-from auvest.scenarios.slat import simulate
+from auvest.simulation.paper_slatf import LEVELS, paper_scenario
+from auvest.simulation.slat import simulate
 from auvest.slat import OverconfidenceWarning, no_harm
 
 PAGE = ROOT / "docs" / "reproduction" / "slat_robust"

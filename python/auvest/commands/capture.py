@@ -36,9 +36,9 @@ from auvest.commands.console import Terminal, table
 from auvest.commands.exit_codes import ExitCode
 from auvest.commands.options import WORLD, fraction, option, refuse_given
 from auvest.commands.session import Floats, Session
-from auvest.scenarios import paper_aukf
-from auvest.scenarios.paper_aukf import observed_positions
-from auvest.scenarios.tracking import Noise, Track
+from auvest.simulation import paper_aukf
+from auvest.simulation.paper_aukf import observed_positions
+from auvest.simulation.tracking import Noise, Track
 from auvest.telemetry import LineError, Reader, Row
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from auvest.scenarios.paper_aukf import DTypeName, NoiseKind
+from auvest.simulation.paper_aukf import DTypeName, NoiseKind
 
 # Panels of --help.
 FILTER = "Filter"

@@ -41,10 +41,10 @@ from auvest.commands.options import (
 )
 from auvest.commands.session import Floats, Session, failure
 from auvest.intervals import IntervalPolicy
-from auvest.scenarios import paper_aukf
-from auvest.scenarios._runs import standard_error
-from auvest.scenarios.paper_aukf import FilterName, TrackName, observed_positions
-from auvest.scenarios.tracking import Scenario, TrackingResult, sensor_of, simulate
+from auvest.simulation import paper_aukf
+from auvest.simulation._runs import standard_error
+from auvest.simulation.paper_aukf import FilterName, TrackName, observed_positions
+from auvest.simulation.tracking import Scenario, TrackingResult, sensor_of, simulate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -31,8 +31,8 @@ from auvest.commands.console import Terminal, table
 from auvest.commands.options import FILTER, MONTE_CARLO, WORLD, finite, fraction, option, positive
 from auvest.commands.session import Floats, Session, failure, mean_over_runs
 from auvest.kernels import KernelName, as_kernel
-from auvest.scenarios import cooperative
-from auvest.scenarios.cooperative import NoiseKind, RangeNoise, Result, Scenario, Timing
+from auvest.simulation import cooperative
+from auvest.simulation.cooperative import NoiseKind, RangeNoise, Result, Scenario, Timing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -39,8 +39,8 @@ from auvest.commands.options import (
 )
 from auvest.commands.session import Floats, Session, failure, mean_over_runs
 from auvest.commands.version import version
-from auvest.scenarios.paper_slatf import LEVELS, PARTICLES, RUNS, FilterName, paper_filter
-from auvest.scenarios.slat import SlatResult, SlatScenario, paper_masters, simulate
+from auvest.simulation.paper_slatf import LEVELS, PARTICLES, RUNS, FilterName, paper_filter
+from auvest.simulation.slat import SlatResult, SlatScenario, paper_masters, simulate
 from auvest.slat import MAX_MASTERS, Lanes, ParticleSlatFilter, Resampling, Slatf
 
 if TYPE_CHECKING:

@@ -243,7 +243,7 @@ class EkfSlat<Motion_, Imm<Models...>, Masters, Safeguards_>
     for (int s = 0; s < count; ++s) {
       if (!is_forgotten(echoes[s])) heard[left++] = echoes[s];
     }
-    Scalar refused[Masters];
+    Scalar refused[Masters] = {};
     if (left > 0 && !correct(heard, left, sonar, refused)) return Status::kOverflow;
     for (int s = 0; s < count; ++s) {
       if (is_forgotten(echoes[s])) rebirth(echoes[s], sonar);
@@ -325,8 +325,8 @@ class EkfSlat<Motion_, Imm<Models...>, Masters, Safeguards_>
     safeguards_.reborn(echo.master);
   }
 
-  /// False, with nothing changed, where no hypothesis could follow. `refused`: the weight of the
-  /// hypotheses to which an echo lies beyond the gate.
+  /// False, with nothing changed, where no hypothesis could follow. `refused`, zero before: the weight
+  /// of the hypotheses to which an echo lies beyond the gate.
   bool correct(const Echo<Scalar>* echoes, int count, const Sonar<Scalar>& sonar,
                Scalar (&refused)[Masters]) {
     bool heard = false;
@@ -334,7 +334,6 @@ class EkfSlat<Motion_, Imm<Models...>, Masters, Safeguards_>
     Weights part;
     log_sum(log_weight_, part);
     Weights log_weight = log_weight_;
-    for (Scalar& weight : refused) weight = Scalar(0);
     for (int h = 0; h < hypotheses_; ++h) {
       Score<Scalar> score;
       Scalar each[Masters] = {};

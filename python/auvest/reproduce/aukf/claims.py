@@ -27,7 +27,7 @@ from auvest.reproduce.aukf.measure import (
 from auvest.reproduce.claims import NO, PARTLY, YES, Claim, Claims, graded
 from auvest.reproduce.estimate import Estimate, all_below_zero
 from auvest.reproduce.markdown import number, series
-from auvest.scenarios.paper_aukf import FIXED_INTERVAL_S, NOISE_KINDS, STEPS, NoiseKind
+from auvest.simulation.paper_aukf import FIXED_INTERVAL_S, NOISE_KINDS, STEPS, NoiseKind
 
 # Verdicts besides those of every paper.
 PRESET = "reproduced with preset figure3; contradicts Table 1"

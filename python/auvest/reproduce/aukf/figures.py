@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from auvest import plots
 from auvest.plots import FILTER_COLOURS, Line
 from auvest.reproduce.aukf.measure import Reproduction, paper_station, tables
-from auvest.scenarios.paper_aukf import NOISE_KINDS, TAU0_STUDIED, NoiseKind
+from auvest.simulation.paper_aukf import NOISE_KINDS, TAU0_STUDIED, NoiseKind
 
 _NAMES: Mapping[NoiseKind, str] = {
     "uniform": "uniform noise",

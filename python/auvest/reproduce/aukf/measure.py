@@ -18,8 +18,8 @@ from auvest import Aukf, FixedInterval, MahalanobisInterval
 from auvest.intervals import IntervalPolicy
 from auvest.reproduce.estimate import Estimate, Floats
 from auvest.reproduce.ticks import Ticks
-from auvest.scenarios._runs import standard_error
-from auvest.scenarios.paper_aukf import (
+from auvest.simulation._runs import standard_error
+from auvest.simulation.paper_aukf import (
     ASSUMPTIONS,
     FIXED_INTERVAL_S,
     NOISE_KINDS,
@@ -32,7 +32,7 @@ from auvest.scenarios.paper_aukf import (
     paper_noise,
     paper_track,
 )
-from auvest.scenarios.tracking import Noise, Scenario, TrackingResult, sensor_of, simulate
+from auvest.simulation.tracking import Noise, Scenario, TrackingResult, sensor_of, simulate
 
 DEFAULT_RUNS = 200
 DEFAULT_SEED = 1

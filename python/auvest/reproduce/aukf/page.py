@@ -34,7 +34,7 @@ from auvest.reproduce.aukf.measure import (
 from auvest.reproduce.claims import assumption_rows, claim_rows, tally
 from auvest.reproduce.estimate import Estimate, Floats
 from auvest.reproduce.markdown import number, rows, series, table
-from auvest.scenarios.paper_aukf import (
+from auvest.simulation.paper_aukf import (
     ASSUMPTIONS,
     FIXED_INTERVAL_S,
     NOISE_KINDS,

@@ -24,8 +24,8 @@ from auvest import (
 )
 from auvest.intervals import IntervalPolicy
 from auvest.reproduce.ticks import Ticks
-from auvest.scenarios._runs import standard_error
-from auvest.scenarios.tracking import Noise, Scenario, Track, TrackingResult, simulate
+from auvest.simulation._runs import standard_error
+from auvest.simulation.tracking import Noise, Scenario, Track, TrackingResult, simulate
 
 DEFAULT_RUNS = 200
 DEFAULT_SEED = 1

@@ -1,7 +1,7 @@
 """The experiments behind ``auvest reproduce mekf`` (Li, Du, Fan, Chen, Mao, Luo 2020).
 
 The paper's lake experiment cannot be repeated: neither its data nor its sensors' values are given.
-What is reproduced is its setting (:mod:`auvest.scenarios.cooperative`) and its claim.
+What is reproduced is its setting (:mod:`auvest.simulation.cooperative`) and its claim.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from auvest import (
 from auvest.kernels import Kernel
 from auvest.reproduce.estimate import Estimate, Floats
 from auvest.reproduce.ticks import Ticks
-from auvest.scenarios import cooperative, matched
-from auvest.scenarios.cooperative import RangeNoise, Result, Scenario, Timing, slave_filter
+from auvest.simulation import cooperative, matched
+from auvest.simulation.cooperative import RangeNoise, Result, Scenario, Timing, slave_filter
 
 DEFAULT_RUNS = 50
 DEFAULT_SEED = 1

@@ -24,9 +24,9 @@ from auvest import (
     SlatfJoint,
 )
 from auvest._arguments import Floats
-from auvest.scenarios._runs import standard_error
-from auvest.scenarios.paper_slatf import LEVELS, PARTICLES, paper_scenario
-from auvest.scenarios.slat import SlatResult, SlatScenario, Vehicle, simulate
+from auvest.simulation._runs import standard_error
+from auvest.simulation.paper_slatf import LEVELS, PARTICLES, paper_scenario
+from auvest.simulation.slat import SlatResult, SlatScenario, Vehicle, simulate
 from auvest.slat import SlatFilter
 from auvest.slat.models import Master
 

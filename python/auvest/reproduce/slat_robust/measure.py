@@ -19,9 +19,9 @@ from auvest import EkfSlat, Slatf, SlatfJoint
 from auvest._arguments import Floats
 from auvest.reproduce.mrclam6 import measure as real
 from auvest.reproduce.ticks import Ticks
-from auvest.scenarios._runs import standard_error
-from auvest.scenarios.paper_slatf import LEVELS, Level, paper_scenario
-from auvest.scenarios.slat import SlatResult, SlatScenario, Vehicle, simulate
+from auvest.simulation._runs import standard_error
+from auvest.simulation.paper_slatf import LEVELS, Level, paper_scenario
+from auvest.simulation.slat import SlatResult, SlatScenario, Vehicle, simulate
 from auvest.slat import OverconfidenceWarning, SlatFilter, no_harm
 
 __all__ = ["check", "measure", "summary"]

@@ -18,7 +18,7 @@ from auvest.reproduce.slatf.measure import (
     rms_per_ping,
     rmse,
 )
-from auvest.scenarios.paper_slatf import FILTERS, LEVELS, FilterName, Level
+from auvest.simulation.paper_slatf import FILTERS, LEVELS, FilterName, Level
 
 #: Levels of Table 1, from loud to precise.
 TABLE1 = LEVELS[:4]

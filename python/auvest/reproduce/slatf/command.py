@@ -24,8 +24,8 @@ from auvest.commands import options
 from auvest.commands.console import table
 from auvest.commands.reproduce import command as command_of
 from auvest.reproduce.slatf import claims, measure, page
-from auvest.scenarios.paper_aukf import DTypeName
-from auvest.scenarios.paper_slatf import FilterName
+from auvest.simulation.paper_aukf import DTypeName
+from auvest.simulation.paper_slatf import FilterName
 
 #: Short, so that the table fits into 80 columns.
 _HEADS: Mapping[FilterName, str] = {

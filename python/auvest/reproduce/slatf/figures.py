@@ -17,7 +17,7 @@ from auvest.reproduce.slatf.measure import (
     Reproduction,
     tables,
 )
-from auvest.scenarios.paper_slatf import FILTERS, LEVELS, FilterName
+from auvest.simulation.paper_slatf import FILTERS, LEVELS, FilterName
 
 #: One colour per filter, the same in every figure.
 COLOURS: Mapping[FilterName, str] = {

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from auvest.reproduce.estimate import Estimate, Floats
-from auvest.scenarios._runs import standard_error
-from auvest.scenarios.paper_aukf import DTypeName
-from auvest.scenarios.paper_slatf import (
+from auvest.simulation._runs import standard_error
+from auvest.simulation.paper_aukf import DTypeName
+from auvest.simulation.paper_slatf import (
     ASSUMPTIONS,
     FILTERS,
     LEVELS,
@@ -27,7 +27,7 @@ from auvest.scenarios.paper_slatf import (
     paper_filter,
     paper_scenario,
 )
-from auvest.scenarios.slat import SlatResult, SlatScenario, simulate
+from auvest.simulation.slat import SlatResult, SlatScenario, simulate
 
 DEFAULT_RUNS = RUNS
 DEFAULT_SEED = 1

@@ -18,7 +18,7 @@ from auvest.reproduce.slatf.claims import (
     span,
     where,
 )
-from auvest.scenarios.paper_slatf import ASSUMPTIONS, FILTERS, LEVELS, FilterName, Level
+from auvest.simulation.paper_slatf import ASSUMPTIONS, FILTERS, LEVELS, FilterName, Level
 
 _COMPARED: tuple[FilterName, ...] = ("slatf1", "slatf2", "ekf_slat")
 

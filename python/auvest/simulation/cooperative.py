@@ -31,7 +31,7 @@ from auvest._fields import (
 from auvest.filters import Ekf, RobustEkf, RobustUkf, Ukf
 from auvest.kernels import Kernel, KernelName, RejectionStreak
 from auvest.models import LeaderRange, SpeedHeading
-from auvest.scenarios._runs import Runs, collect, only_sensor, standard_error
+from auvest.simulation._runs import Runs, collect, only_sensor, standard_error
 
 _DEFAULTS = _core.cooperative_defaults()
 _STREAK = RejectionStreak()

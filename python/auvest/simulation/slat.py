@@ -28,7 +28,7 @@ from auvest._fields import (
     number,
     positive,
 )
-from auvest.scenarios._runs import Runs, collect, standard_error
+from auvest.simulation._runs import Runs, collect, standard_error
 from auvest.slat import MAX_MASTERS, DeadReckoning, EkfSlat, Slatf, SlatFilter, SlatfJoint
 from auvest.slat.models import CompassMotion, Sonar, core_sonar
 

@@ -11,8 +11,8 @@ from filter_support import PAPER, everything, same_bits
 from result_support import tracking_result
 
 import auvest
-from auvest.scenarios import tracking
-from auvest.scenarios.tracking import Noise, Scenario, Track, simulate
+from auvest.simulation import tracking
+from auvest.simulation.tracking import Noise, Scenario, Track, simulate
 
 START = [0.2, 2.0, 0.1, 0.2, 0.01, 0.02]
 P0 = np.diag([0.01, 0.01, 0.01, 0.01, 1e-4, 1e-4])

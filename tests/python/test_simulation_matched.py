@@ -9,7 +9,7 @@ import pytest
 
 import auvest
 from auvest import metrics
-from auvest.scenarios import matched
+from auvest.simulation import matched
 
 X0 = np.array([30.0, 40.0, 0.1, 0.2, 0.0, 0.0])
 P0 = np.diag([0.04, 0.04, 0.01, 0.01, 1e-4, 1e-4])

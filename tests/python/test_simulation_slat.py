@@ -19,9 +19,9 @@ from auvest import (
     Sonar,
     UnicycleMotion,
 )
-from auvest.scenarios import slat
-from auvest.scenarios.paper_slatf import FILTERS, LEVELS, paper_filter, paper_scenario
-from auvest.scenarios.slat import SlatScenario, Vehicle, paper_masters, simulate
+from auvest.simulation import slat
+from auvest.simulation.paper_slatf import FILTERS, LEVELS, paper_filter, paper_scenario
+from auvest.simulation.slat import SlatScenario, Vehicle, paper_masters, simulate
 
 SHORT = SlatScenario(duration_s=60, runs=7)
 START, CERTAIN = np.zeros(2), np.zeros((2, 2))

@@ -9,8 +9,8 @@ import pytest
 from result_support import cooperative_result
 
 import auvest
-from auvest.scenarios import cooperative
-from auvest.scenarios.cooperative import RangeNoise, Scenario, simulate, slave_filter
+from auvest.simulation import cooperative
+from auvest.simulation.cooperative import RangeNoise, Scenario, simulate, slave_filter
 
 SHORT = {"runs": 6, "steps": 600}
 

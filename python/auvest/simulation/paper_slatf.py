@@ -12,9 +12,9 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
-from auvest.scenarios.assumptions import read_assumptions
-from auvest.scenarios.paper_aukf import DTypeName
-from auvest.scenarios.slat import SlatScenario
+from auvest.simulation.assumptions import read_assumptions
+from auvest.simulation.paper_aukf import DTypeName
+from auvest.simulation.slat import SlatScenario
 from auvest.slat import DeadReckoning, EkfSlat, Slatf, SlatFilter, SlatfJoint
 from auvest.slat.models import PiecewiseAcceleration
 

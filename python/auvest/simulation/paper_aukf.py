@@ -21,8 +21,8 @@ from auvest import (
     Ukf,
 )
 from auvest.intervals import IntervalPolicy
-from auvest.scenarios.assumptions import read_assumptions
-from auvest.scenarios.tracking import Noise, Track
+from auvest.simulation.assumptions import read_assumptions
+from auvest.simulation.tracking import Noise, Track
 
 FilterName: TypeAlias = Literal["ekf", "ukf", "aukf"]
 NoiseKind: TypeAlias = Literal["uniform", "normal", "lognormal"]

@@ -32,7 +32,7 @@ from auvest._fields import (
 from auvest.filters import Ekf, Ukf
 from auvest.intervals import FixedInterval
 from auvest.models import ConstantAcceleration, RangeBearing
-from auvest.scenarios._runs import Runs, collect, only_sensor
+from auvest.simulation._runs import Runs, collect, only_sensor
 
 _TRACK = _core.track_defaults()
 _NOISE = _core.noise_defaults()
