@@ -172,7 +172,7 @@ py::array_t<double> curve_plan(const std::string& path) {
   using Curve = mission_detail::MissionCurve<double>;
   const Curve curve{MissionScenario()};
   const bool spline = kind_named<MissionLegs>(path, "path", kLegs) == MissionLegs::kSpline;
-  const py::ssize_t rows = spline ? Curve::kPoints : kMissionCorners;
+  const py::ssize_t rows = spline ? Curve::kPoints : mission_detail::kMissionCorners;
   const std::vector<py::ssize_t> shape{rows, spline ? 2 : 3};
   py::array_t<double> plan(shape);
   double* out = plan.mutable_data();
