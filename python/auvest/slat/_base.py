@@ -27,6 +27,7 @@ from auvest._arguments import (
     as_kind,
     as_number,
     as_step,
+    far_from_origin,
     require_range,
 )
 from auvest._core import Status
@@ -558,6 +559,8 @@ class SlatFilter(Steps):
         try:
             self._core_steps.reset(state, covariance, self._random)
         except _core.StatusError as error:
+            if error.status == Status.far_from_origin:
+                raise ValueError(far_from_origin("x0", state[:2], self._dtype)) from None
             raise ValueError(f"x0, P0 or the parameters are refused: {error}") from None
 
     def _prepare(self) -> None:
@@ -637,6 +640,8 @@ class SlatFilter(Steps):
             try:
                 self._core_steps.add_master(state, covariance)
             except _core.StatusError as error:
+                if error.status == Status.far_from_origin:
+                    raise ValueError(far_from_origin("x", state[:2], self._dtype)) from None
                 if error.status != Status.not_positive_definite:
                     raise ValueError(f"x and P are refused: {error}") from None
                 raise ValueError(f"P must be positive definite in {self._dtype.name}") from None

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from auvest import _core
-from auvest._arguments import Exclusive, Floats, as_array, as_instance
+from auvest._arguments import Exclusive, Floats, as_array, as_instance, far_from_origin
 from auvest._core import Status
 from auvest.errors import FilterError
 from auvest.slat._base import SlatFilter, Steps, as_covariance
@@ -98,6 +98,9 @@ class Outage(Steps):
             try:
                 self._core_steps.share(state, covariance, states[heard], covariances[heard])
             except _core.StatusError as error:
+                if error.status == Status.far_from_origin:
+                    places = np.concatenate([state[:2], *states[:, :2]])
+                    raise ValueError(far_from_origin("a place", places, self._dtype)) from None
                 raise ValueError(f"the shared state is refused: {error}") from None
 
     def _require_started(self, core: Any, counts: npt.NDArray[np.int64]) -> None:

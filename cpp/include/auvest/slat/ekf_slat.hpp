@@ -52,7 +52,7 @@ class EkfSlat : public SlatFilter<Motion_, Masters, Safeguards_> {
   /// There is no master yet.
   Status reset(const SlaveBelief& pose, math::Random&) {
     if (model_.check() != Status::kOk || !params_.valid()) return Status::kBadParameter;
-    const Status status = check_slave(pose);
+    const Status status = check_start(pose);
     if (status != Status::kOk) return status;
     this->start(Frame::noise_of_an_hour(model_.motion, model_.master[0]));
     Model::start(pose, belief_);

@@ -48,14 +48,15 @@ class Outage {
   Status share(const SlaveBelief& slave, const MasterBelief* masters, int count) {
     constexpr int kRoom = Filter::kMasters;
     if (count < 0 || count > Masters || (kRoom > 0 && count > kRoom)) return Status::kBadParameter;
-    const Status status = check_slave(slave);
-    if (status != Status::kOk) return status;
-    for (int n = 0; n < count; ++n) {
+    Status status = check_start(slave);
+    for (int n = 0; n < count && status == Status::kOk; ++n) {
       if (!math::all_finite(masters[n].x) || !math::lower_finite(masters[n].P)) {
         return Status::kNotFinite;
       }
       if (!math::is_positive_definite(masters[n].P)) return Status::kNotPositiveDefinite;
+      status = check_numbers(masters[n]);
     }
+    if (status != Status::kOk) return status;
     slave_ = slave;
     count_ = count;
     for (int n = 0; n < count; ++n) masters_[n] = masters[n];

@@ -98,7 +98,7 @@ class SlatfJoint : public SlatfJointFrame<Motion_, Masters, Resampling_, Safegua
     const bool valid = this->fits(particles) && Frame::is_share(params_.resample_below) &&
                        Frame::is_share(params_.kept) && params_.valid();
     if (!valid || model_.check() != Status::kOk) return Status::kBadParameter;
-    const Status status = check_slave(pose);
+    const Status status = check_start(pose);
     if (status != Status::kOk) return status;
     this->start(particles, Frame::noise_of_an_hour(model_.motion, model_.master[0]));
     Joint joint;
