@@ -10,8 +10,11 @@
 #include <limits>
 #include <memory>
 #include <string>
+#include <type_traits>
 #include <utility>
+#include <vector>
 
+#include "auvest/filters/gaussian_sum.hpp"
 #include "auvest/filters/robust.hpp"
 #include "auvest/runtime/any_kernel.hpp"
 #include "auvest/runtime/any_linearisation.hpp"
@@ -54,8 +57,9 @@ struct AnySensor {
 template <class Scalar, int N>
 struct ProcessFor : AnyProcess<Scalar> {
   using Input = Vector<Scalar, kMaxInputs>;
+  const bool translates;  ///< as ProcessModel's kTranslation
 
-  explicit ProcessFor(int u) : AnyProcess<Scalar>(N, u) {}
+  ProcessFor(int u, bool moves_all_alike) : AnyProcess<Scalar>(N, u), translates(moves_all_alike) {}
 
   virtual Status predict(const AnyLinearisation<Scalar>& how, Belief<Scalar, N>& belief, Scalar dt,
                          const Input& input) const = 0;
@@ -76,6 +80,7 @@ struct RuntimeProcess {
   Scalar position_variance(const Belief<Scalar, N>& belief, Scalar dt) const {
     return model->position_variance(belief, dt, input);
   }
+  bool translates() const { return model->translates; }
 };
 
 /// A Gaussian filter whose process and whose linearisation are chosen at run time.
@@ -112,14 +117,49 @@ class RuntimeGaussian
 template <class Scalar, int N>
 struct PlacedSensor;
 
+const int kMaxComponents = 255;  ///< of a Gaussian sum
+
+/// An array as long as it is asked to be.
+template <class Element>
+class Sequence {
+ public:
+  void resize(int size) { elements_.resize(static_cast<std::size_t>(size)); }
+  Element& operator[](int k) { return elements_[static_cast<std::size_t>(k)]; }
+  const Element& operator[](int k) const { return elements_[static_cast<std::size_t>(k)]; }
+
+ private:
+  std::vector<Element> elements_;
+};
+
+/// As ComponentArrays, but only as many as a filter asks for: most ask for none.
+template <class Scalar, int N>
+struct ComponentSequences {
+  std::uint8_t size = 1;
+  Sequence<Scalar> weight;
+  Sequence<Belief<Scalar, N>> component;
+
+  void reserve(int most) {
+    weight.resize(most);
+    component.resize(most);
+  }
+};
+
+template <class Scalar, int N>
+using RuntimeInside =
+    Robust<RuntimeGaussian<Scalar, N>, RobustUpdate<AnyKernel<Scalar>, AnyRecovery<Scalar>>>;
+
+/// A Gaussian sum, of one component where nothing else is asked for; one state is no position.
+template <class Scalar, int N>
+using RuntimeSum = std::conditional_t<
+    (N > 1), GaussianSum<RuntimeInside<Scalar, N>, kMaxComponents, ComponentSequences<Scalar, N>>,
+    RuntimeInside<Scalar, N>>;
+
 /// The same with any kernel and recovery, and with sensors that are chosen at run time.
 template <class Scalar_, int N>
-class RuntimeRobust : public Robust<RuntimeGaussian<Scalar_, N>,
-                                    RobustUpdate<AnyKernel<Scalar_>, AnyRecovery<Scalar_>>> {
+class RuntimeRobust : public RuntimeSum<Scalar_, N> {
  public:
   using Scalar = Scalar_;
-  using Base =
-      Robust<RuntimeGaussian<Scalar, N>, RobustUpdate<AnyKernel<Scalar>, AnyRecovery<Scalar>>>;
+  using Base = RuntimeSum<Scalar, N>;
   using Base::Base;
   using Base::update;
 
@@ -158,7 +198,7 @@ class ProcessOf final : public ProcessFor<typename Process::Scalar, Process::kSt
 
   /// `count`: how many of the numbers of the model's input count.
   explicit ProcessOf(const Process& process, int count = kInputs)
-      : Base(count), process_(process) {}
+      : Base(count, Process::kTranslation), process_(process) {}
 
   const Process& process() const { return process_; }
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from auvest import metrics as metrics
     from auvest import montecarlo as montecarlo
     from auvest import simulation as simulation
+    from auvest._core import Convergence as Convergence
     from auvest._core import Decision as Decision
     from auvest._core import SelfTestPart as SelfTestPart
     from auvest._core import SelfTestResult as SelfTestResult
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from auvest.errors import ModelError as ModelError
     from auvest.filters import Aukf as Aukf
     from auvest.filters import Ekf as Ekf
+    from auvest.filters import Mixture as Mixture
     from auvest.filters import Report as Report
     from auvest.filters import RobustEkf as RobustEkf
     from auvest.filters import RobustUkf as RobustUkf
@@ -84,6 +86,7 @@ else:
         "CompassMotion": "slat.models",
         "ConstantAcceleration": "models",
         "ConstantVelocity": "slat.models",
+        "Convergence": "_core",
         "CoordinatedTurn": "slat.models",
         "CovarianceBudget": "intervals",
         "DeadReckoning": "slat",
@@ -103,6 +106,7 @@ else:
         "LeaderRange": "models",
         "MahalanobisInterval": "intervals",
         "MeasurementModel": "models",
+        "Mixture": "filters",
         "ModelError": "errors",
         "Odometry": "models",
         "Outage": "slat",

@@ -48,7 +48,7 @@ from auvest.telemetry import LineError
     ],
 )
 def test_numbers_are_digits_over_a_power_of_ten(text: str, value: float) -> None:
-    assert mission_line.number(text).tobytes() == np.float32(value).tobytes()
+    assert telemetry.number(text).tobytes() == np.float32(value).tobytes()
 
 
 @pytest.mark.parametrize(
@@ -56,7 +56,7 @@ def test_numbers_are_digits_over_a_power_of_ten(text: str, value: float) -> None
 )
 def test_what_is_no_number(text: str) -> None:
     with pytest.raises(LineError, match="not a number of up to nine digits"):
-        mission_line.number(text)
+        telemetry.number(text)
 
 
 def test_readings_come_back_to_half_a_digit() -> None:
@@ -202,7 +202,10 @@ class PortWithPilot:
         if self._twin.listener.start is None:
             self._twin.start(lines[0])
             self._out.append(
-                "# columns: sample,time_s,mode,awake_us,refused,missed,implausible,late"
+                telemetry.frame(
+                    "COLUMNS,MISSION,sample#,time_s,mode#,awake_us#,refused#,missed#,implausible#,"
+                    "late#"
+                )
             )
         else:
             command = list(self._twin.step(lines))

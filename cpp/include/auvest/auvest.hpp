@@ -3,6 +3,8 @@
 
 #include "auvest/config.hpp"  // first: it says what is wrong with a compiler
 
+#include "auvest/board/crc32.hpp"
+#include "auvest/board/line.hpp"
 #include "auvest/control/autopilot.hpp"
 #include "auvest/control/depth_control.hpp"
 #include "auvest/control/heading_control.hpp"

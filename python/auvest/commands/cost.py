@@ -34,7 +34,6 @@ from auvest.commands.console import Terminal
 from auvest.commands.exit_codes import ExitCode
 from auvest.commands.version import version
 from auvest.firmware.cost import KERNELS, POLICIES, Cost, measure
-from auvest.firmware.package import PackageError
 from auvest.firmware.simulator import SimulatorError
 from auvest.firmware.sketch import SketchError
 from auvest.registry import FILTERS
@@ -47,7 +46,12 @@ def command(
     header: Annotated[
         Path | None,
         typer.Argument(
-            metavar="HEADER", help="Header with models of your own.", show_default=False
+            metavar="HEADER",
+            help="Header with models of your own.",
+            exists=True,
+            dir_okay=False,
+            readable=True,
+            show_default=False,
         ),
     ] = None,
     filter_name: Annotated[
@@ -125,7 +129,7 @@ def command(
                 seed=seed,
                 progress=progress,
             )
-        except (BoardError, FileNotFoundError, PackageError, SimulatorError, SketchError) as error:
+        except (BoardError, FileNotFoundError, SimulatorError, SketchError) as error:
             terminal.fail(str(error), ExitCode.FAILED)
     if new is not None:
         terminal.publish(new)

@@ -247,7 +247,7 @@ def _fly_port(
                 if now - last_s > SILENCE_S:
                     raise _ConnectionLost(
                         f"{port}: no line for {SILENCE_S:g} s: does the board run mission, at "
-                        f"{baud} baud?"
+                        f"{baud} baud? {chip.last_damage}".rstrip()
                     )
     except (serial.SerialException, OSError) as error:
         raise _ConnectionLost(f"{port}: {error}") from None
