@@ -74,6 +74,22 @@ TEST_CASE("planar hull: the current carries it, and does nothing else") {
   for (int i = 2; i < 6; ++i) CHECK(carried(i) == still(i));
 }
 
+TEST_CASE("planar hull: hours on a circle, of which only the beginning is integrated") {
+  Process fine = driven(0.05, 15);
+  fine.params.step_s = 0.5;  // integrates for 2,048 s
+  const Process coarse = driven(0.05, 15);
+  const State x = state(0, 0, 0, 1, 0, 0, 0.1, 0.05);
+  const State long_way = fine.f(x, 2000);
+  const State short_way = coarse.f(x, 2000);  // integrates for 410 s
+  for (int i = 0; i < 8; ++i) {
+    const double difference = fine.residual(short_way, long_way)(i);
+    CAPTURE(i);
+    CHECK(std::fabs(difference) < (i < 2 ? 1e-2 : i == 2 ? 1e-3 : 1e-6));
+  }
+  const State straight = driven(0, 15).f(state(0, 0, 0, 1.49833, 0, 0, 0, 0), 7200);
+  CHECK(std::fabs(straight(0) - 7200 * 1.49833) < 0.05);
+}
+
 TEST_CASE("planar hull: Phi is the Jacobian of f") {
   const State places[] = {state(5, 3, 0.4, 1.5, 0.02, 0.05, 0.3, -0.1),
                           state(-7, 1, 3.1, 1.4, -0.2, 0.15, 0, 0.2),

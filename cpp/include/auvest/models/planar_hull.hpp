@@ -21,6 +21,7 @@
 #include "auvest/math/angle.hpp"
 #include "auvest/math/basic.hpp"
 #include "auvest/math/linear_algebra.hpp"
+#include "auvest/math/trigonometry.hpp"
 #include "auvest/models/process_model.hpp"
 #include "auvest/status.hpp"
 #include "auvest/types.hpp"
@@ -74,10 +75,13 @@ struct PlanarHull : ProcessModel<PlanarHull<Scalar_>, Scalar_, 8> {
 
   State f(const State& x, Scalar dt) const {
     const Scalar actuators[3] = {input(0), Scalar(0), input(1)};
-    const std::uint16_t steps = steps_in(dt);
-    const Scalar h = dt / Scalar(steps);
+    const Scalar longest = Scalar(kMostSteps) * params.step_s;
+    const Scalar moving = dt < longest ? dt : longest;
+    const std::uint16_t steps = steps_in(moving);
+    const Scalar h = moving / Scalar(steps);
     State next = x;
     for (std::uint16_t k = 0; k < steps; ++k) step(next, actuators, h);
+    if (moving < dt) turn_steadily(next, dt - moving);
     next(2) = math::wrap(next(2));
     return next;
   }
@@ -129,18 +133,35 @@ struct PlanarHull : ProcessModel<PlanarHull<Scalar_>, Scalar_, 8> {
       p(i + 6, i) = p(i + 6, i) + Value(walk * dt / Scalar(2));
       p(i + 6, i + 6) = p(i + 6, i + 6) + Value(walk);
     }
+    // What is more than 20 s ago the damping has taken.
+    const Scalar felt = dt < Scalar(20) ? dt : Scalar(20);
     for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j <= i; ++j) p(3 + i, 3 + j) = p(3 + i, 3 + j) + Value(push_(i, j) * dt);
+      for (int j = 0; j <= i; ++j) p(3 + i, 3 + j) = p(3 + i, 3 + j) + Value(push_(i, j) * felt);
     }
   }
 
  private:
-  /// Steps of equal length, none longer than step_s; but for a quarter of an hour and more, which
-  /// have 8,191: there the hull has long been steady.
+  /// After so many steps the speeds no longer change: 7 minutes of 0.1 s, 20 times the longest time
+  /// constant.
+  static constexpr std::uint16_t kMostSteps = 4096;
+
+  /// Steps of equal length, none longer than step_s.
   std::uint16_t steps_in(Scalar dt) const {
     std::uint16_t steps = 1;
-    while (steps < 8191 && Scalar(steps) * params.step_s < dt) ++steps;
+    while (steps < kMostSteps && Scalar(steps) * params.step_s < dt) ++steps;
     return steps;
+  }
+
+  /// dt more seconds on a circle, or a line: the chord of the way through the water, and the drift.
+  void turn_steadily(State& x, Scalar dt) const {
+    const Scalar half = Scalar(0.5) * x(5) * dt;
+    Scalar sine, cosine;
+    math::sincos(half, sine, cosine);
+    const Scalar chord = math::absolute(half) < Scalar(1e-3) ? dt : dt * (sine / half);
+    math::sincos(x(2) + half, sine, cosine);
+    x(0) = x(0) + chord * (x(3) * cosine - x(4) * sine) + dt * x(6);
+    x(1) = x(1) + chord * (x(3) * sine + x(4) * cosine) + dt * x(7);
+    x(2) = x(2) + (half + half);
   }
 
   void rate(const State& x, const Scalar* actuators, State& slope) const {
