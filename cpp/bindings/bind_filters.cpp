@@ -349,6 +349,7 @@ desk::Catalogue<Scalar>& catalogue() {
     desk::add_models<3>(*made);
     desk::add_models<4>(*made);
     desk::add_models<6>(*made);
+    desk::add_models<8>(*made);
     if constexpr (std::is_same<Scalar, double>::value) desk::add_function_filters(*made);
     return made;
   }();

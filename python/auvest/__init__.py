@@ -46,9 +46,11 @@ if TYPE_CHECKING:
     from auvest.models import Depth as Depth
     from auvest.models import FunctionProcess as FunctionProcess
     from auvest.models import FunctionSensor as FunctionSensor
+    from auvest.models import HeadingSpeed as HeadingSpeed
     from auvest.models import LeaderRange as LeaderRange
     from auvest.models import MeasurementModel as MeasurementModel
     from auvest.models import Odometry as Odometry
+    from auvest.models import PlanarHull as PlanarHull
     from auvest.models import Position as Position
     from auvest.models import ProcessModel as ProcessModel
     from auvest.models import RangeBearing as RangeBearing
@@ -97,6 +99,7 @@ else:
         "FunctionProcess": "models",
         "FunctionSensor": "models",
         "Hampel": "kernels",
+        "HeadingSpeed": "models",
         "Huber": "kernels",
         "Igg": "kernels",
         "Imm": "slat.models",
@@ -108,6 +111,7 @@ else:
         "Odometry": "models",
         "Outage": "slat",
         "PiecewiseAcceleration": "slat.models",
+        "PlanarHull": "models",
         "Position": "models",
         "ProcessModel": "models",
         "RangeBearing": "models",
