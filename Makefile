@@ -97,8 +97,8 @@ wheel: $(VENV)/.auvest-build-requires ## a wheel of the package in dist/
 	$(PY) -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .
 	@ls dist/*.whl
 
-library: setup-dev install ## the Arduino library: a zip in dist/
-	$(PY) -m auvest.firmware.package --output dist
+library: install ## the Arduino library: a zip in dist/
+	mkdir -p dist && $(VENV)/bin/auvest library --output dist
 
 # The simulated board, and the sketch tracking_loop compiled for it.
 .PHONY: board capture

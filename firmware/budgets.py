@@ -25,7 +25,7 @@ import numpy as np
 
 from auvest import mission_line, telemetry
 from auvest.board import Board, BoardError, SerialLine
-from auvest.firmware.package import PackageError, package
+from auvest.firmware.package import package
 from auvest.firmware.sketch import Compiled, SketchError, compile_sketch
 from auvest.simulation import cooperative
 from auvest.simulation.paper_aukf import FilterName, paper_filter, paper_noise
@@ -445,7 +445,7 @@ def _run_tracking_loop(compiled: Compiled, folder: Path) -> Row:
             if not isinstance(event, SerialLine):
                 continue
             row = reader.read(event.text)
-            if row is not None:
+            if isinstance(row, dict):
                 rows.append(row)
             if len(rows) == 60:
                 break
@@ -458,7 +458,7 @@ def _run_tracking_loop(compiled: Compiled, folder: Path) -> Row:
 
 def _run_slave_tracking(compiled: Compiled, folder: Path) -> Row:
     """Measure 20 pings of the paper's scenario: the cycles awake between two of them."""
-    reader = telemetry.Reader("SLAVE")
+    reader = telemetry.Reader()
     awake_us: list[float] = []
     readings = paper_world().readings
     with Board(compiled.elf, limit_s=120.0) as board:
@@ -466,7 +466,7 @@ def _run_slave_tracking(compiled: Compiled, folder: Path) -> Row:
             if not isinstance(event, SerialLine):
                 continue
             row = reader.read(event.text)
-            if row is not None:
+            if isinstance(row, dict):
                 awake_us.append(row["awake_us"])
             if len(awake_us) == 41:
                 break
@@ -735,7 +735,7 @@ def main() -> int:
     try:
         with tempfile.TemporaryDirectory() as folder:
             rows = measure(Path(folder))
-    except (BoardError, BudgetError, PackageError, SketchError, FileNotFoundError) as error:
+    except (BoardError, BudgetError, SketchError, FileNotFoundError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
     if arguments.write:

@@ -157,11 +157,13 @@ py::tuple run(FilterHandle<Scalar>& handle, const py::dict& given, const py::lis
   const py::ssize_t m = z.shape(1);
   const py::ssize_t n = handle.filter->states();
   const py::ssize_t full = covariance ? rows : 0;
+  const bool sums = handle.filter->components() > 1;
   py::array_t<Scalar> x({rows, n}), p({full, n, n}), s({full, m, m});
   py::array_t<Scalar> innovation({rows, m}), standardised({rows, m}), weight({rows, m});
   py::array_t<Scalar> nis(rows), interval(rows);
   py::array_t<std::uint8_t> decision(rows), iterations(rows);
   py::array_t<bool> near_field(rows), recovered(rows), too_late(rows);
+  py::array_t<std::uint8_t> convergence(sums ? rows : 0), size(sums ? rows : 0);
   desk::Columns<Scalar> out;
   out.x = x.mutable_data();
   out.P = covariance ? p.mutable_data() : nullptr;
@@ -176,6 +178,8 @@ py::tuple run(FilterHandle<Scalar>& handle, const py::dict& given, const py::lis
   out.near_field = near_field.mutable_data();
   out.recovered = recovered.mutable_data();
   out.too_late = too_late.mutable_data();
+  out.convergence = sums ? convergence.mutable_data() : nullptr;
+  out.size = sums ? size.mutable_data() : nullptr;
   std::size_t done;
   {
     py::gil_scoped_release release;
@@ -195,6 +199,8 @@ py::tuple run(FilterHandle<Scalar>& handle, const py::dict& given, const py::lis
   result["recovered"] = recovered;
   result["interval_s"] = interval;
   result["too_late"] = too_late;
+  result["convergence"] = convergence;
+  result["mixture_size"] = size;
   return py::make_tuple(done, handle.status, result);
 }
 
@@ -222,6 +228,7 @@ py::tuple save(const FilterHandle<Scalar>& handle) {
   result["input"] = numbers(state.input);
   result["policy"] = numbers(state.policy);
   result["recovery"] = numbers(state.recovery);
+  if (!state.mixture.empty()) result["mixture"] = numbers(state.mixture);
   result["base"] = numbers(state.base);
   result["events"] = numbers(state.events);
   py::list sensors;
@@ -241,6 +248,7 @@ void restore(FilterHandle<Scalar>& handle, const py::dict& given, const py::list
   state.input = numbers<Scalar>(given, "input");
   state.policy = numbers<Scalar>(given, "policy");
   state.recovery = numbers<Scalar>(given, "recovery");
+  if (given.contains("mixture")) state.mixture = numbers<Scalar>(given, "mixture");
   state.base = numbers<Scalar>(given, "base");
   state.events = numbers<Scalar>(given, "events");
   for (const auto& sensor : sensors) {
@@ -298,8 +306,25 @@ desk::FilterOptions<Scalar> to_options(const py::dict& given, const AnyKernel<Sc
   options.policy = policy;
   options.late_s = given["late_s"].cast<Scalar>();
   options.longest_step_s = given["longest_step_s"].cast<Scalar>();
+  options.components = given["components"].cast<std::uint8_t>();
+  options.headings = given["headings"].cast<std::uint8_t>();
   if (!(options.longest_step_s > Scalar(0))) throw StatusError(Status::kBadParameter);
   return options;
+}
+
+/// The components of the belief: weights (n), means (n, states) and covariances (n, states,
+/// states).
+template <class Scalar>
+py::tuple mixture(const FilterHandle<Scalar>& handle) {
+  require_idle(handle);
+  const py::ssize_t n = handle.filter->size();
+  const py::ssize_t states = handle.filter->states();
+  py::array_t<Scalar> weight(n), x({n, states}), p({n, states, states});
+  for (py::ssize_t k = 0; k < n; ++k) {
+    handle.filter->component(static_cast<int>(k), *weight.mutable_data(k), x.mutable_data(k, 0),
+                             p.mutable_data(k, 0, 0));
+  }
+  return py::make_tuple(weight, x, p);
 }
 
 template <class Scalar>
@@ -324,6 +349,7 @@ desk::Catalogue<Scalar>& catalogue() {
     desk::add_models<3>(*made);
     desk::add_models<4>(*made);
     desk::add_models<6>(*made);
+    desk::add_models<8>(*made);
     if constexpr (std::is_same<Scalar, double>::value) desk::add_function_filters(*made);
     return made;
   }();
@@ -440,6 +466,12 @@ void bind_precision(py::module_& m) {
       .def("set_report", &set_report<Scalar>, py::arg("report"), py::arg("status"))
       .def_property_readonly("report", &report<Scalar>)
       .def_property_readonly("law", &law<Scalar>)
+      .def_property_readonly("mixture", &mixture<Scalar>)
+      .def_property_readonly("convergence",
+                             [](const Filter& f) {
+                               require_idle(f);
+                               return f.filter->convergence();
+                             })
       .def_property_readonly(
           "status",
           [](const Filter& f) { return f.status == Status::kOk ? f.filter->status() : f.status; })
@@ -547,6 +579,14 @@ void bind_precision(py::module_& m) {
 void bind_filters(py::module_& m) {
   m.attr("UNCLEAR") = kUnclear;
   m.attr("MAX_PLACE") = kMaxPlace;
+  m.attr("MAX_COMPONENTS") = desk::kMaxComponents;
+  py::enum_<Convergence>(m, "Convergence", "What the ranges say about where the craft is.")
+      .value("not_converged", Convergence::kNotConverged)
+      .value("ambiguous", Convergence::kAmbiguous)
+      .value("settling", Convergence::kSettling)
+      .value("settled", Convergence::kSettled);
+  m.def("describe", static_cast<const char* (*)(Convergence)>(&describe), py::arg("convergence"),
+        "One line of English for a convergence.");
   bind_precision<float>(m);
   bind_precision<double>(m);
   m.def("load_library", &load_library, py::arg("path"));

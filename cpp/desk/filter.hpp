@@ -1,5 +1,6 @@
 // A filter put together at run time: any process, linearisation, kernel, recovery and interval
-// policy, sensors of any kind, measurements of an earlier time, and whole records.
+// policy, one Gaussian or a sum of several, sensors of any kind, measurements of an earlier time,
+// and whole records.
 //
 // It is the core's filters that run here: RuntimeRobust is their composition, and every model
 // brings its own compiled predict and update (models.hpp). Failure is a value, as everywhere.
@@ -22,7 +23,7 @@ namespace desk {
 template <class Scalar>
 struct FilterOptions {
   using Linearisation = AnyLinearisation<Scalar>;
-  using Rule = RobustUpdate<AnyKernel<Scalar>, AnyRecovery<Scalar>>;
+  using Rule = RuntimeRule<Scalar>;
 
   typename Linearisation::Kind kind = Linearisation::Kind::kEkf;
   typename SigmaPoints<Scalar>::Params points;
@@ -30,6 +31,8 @@ struct FilterOptions {
   AnyInterval<Scalar> policy;
   Scalar longest_step_s = Scalar(3600);  ///< a longer prediction is refused [s]
   Scalar late_s = Scalar(0);             ///< how far back a measurement may belong [s]
+  int components = 1;                    ///< of a Gaussian sum: 1, or 8..kMaxComponents
+  int headings = 1;                      ///< of which so many at the start: 1, or 2..components / 8
 };
 
 /// Rows in: each predicts, corrects by what was measured, and chooses the next interval.
@@ -63,6 +66,8 @@ struct Columns {
   bool* near_field;
   bool* recovered;
   bool* too_late;
+  std::uint8_t* convergence;  ///< this and `size` may be null
+  std::uint8_t* size;
 };
 
 /// All that a filter carries from step to step, as numbers.
@@ -72,13 +77,20 @@ struct FilterState {
   std::vector<Scalar> input;     ///< that drove the last prediction
   std::vector<Scalar> policy;    ///< interval and the memory of the Mahalanobis law: 9 numbers
   std::vector<Scalar> recovery;  ///< count, variance, two recent rejections, widenings: 9 numbers
-  std::vector<Scalar> base;      ///< of the late memory: x, P, input, recovery of its base
+  std::vector<Scalar> mixture;   ///< of a Gaussian sum: see mixture_numbers(); else empty
+  std::vector<Scalar> base;      ///< of the late memory: x, P, input, recovery, mixture of its base
   std::vector<Scalar> events;    ///< of the late memory: kEventNumbers each
   std::vector<std::shared_ptr<const AnySensor<Scalar>>> sensors;  ///< of the events; null: predict
 };
 
 /// Numbers of a recovery.
 const std::size_t kRecoveryNumbers = 9;
+
+/// Numbers of a mixture of `size` components: accepted, headings, bend, size, and of each weight, x
+/// and P. A single one is the belief itself.
+inline std::size_t mixture_numbers(int size, int states) {
+  return static_cast<std::size_t>(4 + (size > 1 ? size * (1 + states + states * states) : 0));
+}
 
 /// Numbers of an event: dt, input, z, moved, place.
 const std::size_t kEventNumbers = 1 + kMaxInputs + kMaxSize + 1 + kMaxPlace;
@@ -111,6 +123,14 @@ class AnyFilter {
   virtual void P(Scalar* out) const = 0;
   virtual Scalar interval() const = 0;
   virtual const AnyInterval<Scalar>& policy() const = 0;
+
+  /// How many components a Gaussian sum may have; 1: it is none.
+  virtual int components() const = 0;
+  /// Of a Gaussian sum.
+  virtual Convergence convergence() const = 0;
+  /// How many components there are now, and number k of them.
+  virtual int size() const = 0;
+  virtual void component(int k, Scalar& weight, Scalar* x, Scalar* P) const = 0;
 
   virtual FilterState<Scalar> save() const = 0;
   virtual Status restore(const FilterState<Scalar>& state) = 0;
@@ -159,6 +179,7 @@ class FilterFor final : public AnyFilter<Scalar> {
 
   FilterFor(const std::shared_ptr<const ProcessFor<Scalar, N>>& process, const Options& options)
       : filter_(robust(process, options), options.policy),
+        headings_(options.headings),
         late_s_(options.late_s),
         memory_(filter_, Events(options.late_s)) {}
 
@@ -178,8 +199,15 @@ class FilterFor final : public AnyFilter<Scalar> {
     for (int i = 0; i < N; ++i) x(i) = x0[i];
     for (int i = 0; i < N * N; ++i) p.data()[i] = P0[i];
     for (int i = 0; i < 2; ++i) desired(i) = reference[i];
-    const Status status = filter_.reset(x, p, desired);
-    if (status == Status::kOk) memory_ = Memory(filter_, Events(late_s_));
+    Adaptive filter = filter_;
+    Status status = filter.reset(x, p, desired);
+    if constexpr (N > 2) {
+      Robust& robust = filter;
+      if (status == Status::kOk && headings_ > 1) status = robust.reset(x, p, headings_);
+    }
+    if (status != Status::kOk) return status;
+    filter_ = filter;
+    memory_ = Memory(filter_, Events(late_s_));
     return status;
   }
 
@@ -244,6 +272,30 @@ class FilterFor final : public AnyFilter<Scalar> {
   Scalar interval() const override { return filter_.interval(); }
   const AnyInterval<Scalar>& policy() const override { return filter_.policy(); }
 
+  int components() const override {
+    if constexpr (kSums) return filter_.params().components;
+    return 1;
+  }
+  Convergence convergence() const override {
+    if constexpr (kSums) return filter_.convergence();
+    return Convergence::kSettled;
+  }
+  int size() const override {
+    if constexpr (kSums) return filter_.size();
+    return 1;
+  }
+  void component(int k, Scalar& weight, Scalar* x, Scalar* P) const override {
+    typename Robust::BeliefType belief = filter_.belief();
+    weight = Scalar(1);
+    if constexpr (kSums) {
+      belief = filter_.component(k);
+      weight = filter_.weight(k);
+    }
+    math::mirror_lower(belief.P);
+    copy(belief.x, x);
+    copy(belief.P, P);
+  }
+
   FilterState<Scalar> save() const override {
     FilterState<Scalar> state;
     append(filter_.x(), state.x);
@@ -260,11 +312,13 @@ class FilterFor final : public AnyFilter<Scalar> {
                     law.last_reference(0),
                     law.last_reference(1)};
     append_recovery(filter_, state.recovery);
+    append_mixture(filter_, state.mixture);
     if (!late()) return state;
     append(memory_.base().x(), state.base);
     append(memory_.base().P(), state.base);
     append(memory_.base().process().input, state.base);
     append_recovery(memory_.base(), state.base);
+    append_mixture(memory_.base(), state.base);
     for (int k = 0; k < memory_.events().size(); ++k) {
       const Event& event = memory_.events()[k];
       state.events.push_back(event.dt);
@@ -279,10 +333,10 @@ class FilterFor final : public AnyFilter<Scalar> {
 
   Status restore(const FilterState<Scalar>& state) override {
     Adaptive filter = filter_;
-    const std::size_t base = N + N * N + kMaxInputs + kRecoveryNumbers;
+    const std::size_t base = N + N * N + kMaxInputs + kRecoveryNumbers;  // and the mixture
     if (state.x.size() != N || state.P.size() != N * N || state.input.size() != kMaxInputs ||
         state.policy.size() != 9 || state.recovery.size() != kRecoveryNumbers ||
-        state.base.size() != (late() ? base : 0) ||
+        (late() ? state.base.size() < base : !state.base.empty()) ||
         state.events.size() != kEventNumbers * state.sensors.size()) {
       return Status::kBadParameter;
     }
@@ -297,15 +351,21 @@ class FilterFor final : public AnyFilter<Scalar> {
       law.last_estimate(i) = p[5 + i];
       law.last_reference(i) = p[7 + i];
     }
-    Status status = restore_robust(filter, state.x.data(), state.P.data(), state.input.data(),
-                                   state.recovery.data());
-    if (status == Status::kOk) status = filter.restore(filter.belief(), policy, p[0]);
+    // First the policy: the belief comes with its mixture then.
+    typename Robust::BeliefType belief;
+    std::copy_n(state.x.data(), N, belief.x.data());
+    std::copy_n(state.P.data(), N * N, belief.P.data());
+    Status status = filter.restore(belief, policy, p[0]);
+    if (status != Status::kOk) return status;
+    status = restore_robust(filter, state.x.data(), state.P.data(), state.input.data(),
+                            state.recovery.data(), state.mixture.data(), state.mixture.size());
     if (status != Status::kOk) return status;
 
     Robust start = filter;
     if (late()) {
       const Scalar* b = state.base.data();
-      status = restore_robust(start, b, b + N, b + N + N * N, b + N + N * N + kMaxInputs);
+      status = restore_robust(start, b, b + N, b + N + N * N, b + N + N * N + kMaxInputs, b + base,
+                              state.base.size() - base);
       if (status != Status::kOk) return status;
     }
     Events events(late_s_);
@@ -323,14 +383,22 @@ class FilterFor final : public AnyFilter<Scalar> {
   }
 
  private:
+  static constexpr bool kSums = N > 1;  // one state is no position
+
   static Robust robust(const std::shared_ptr<const ProcessFor<Scalar, N>>& process,
                        const Options& options) {
     RuntimeProcess<Scalar, N> driven;
     driven.model = process;
     const AnyLinearisation<Scalar> how(options.kind, options.points, N);
-    Robust filter(RuntimeGaussian<Scalar, N>(driven, how), options.rule);
-    filter.limit_steps(options.longest_step_s);
-    return filter;
+    RuntimeInside<Scalar, N> inside(RuntimeGaussian<Scalar, N>(driven, how), options.rule);
+    inside.limit_steps(options.longest_step_s);
+    if constexpr (kSums) {
+      typename Robust::Params params;
+      params.components = static_cast<std::uint8_t>(options.components);
+      return Robust(inside, params);
+    } else {
+      return Robust(inside);
+    }
   }
 
   bool late() const { return late_s_ > Scalar(0); }
@@ -381,6 +449,10 @@ class FilterFor final : public AnyFilter<Scalar> {
     out.near_field[k] = report.near_field;
     out.recovered[k] = report.recovered;
     out.too_late[k] = too_late;
+    if (out.convergence != nullptr) {
+      out.convergence[k] = static_cast<std::uint8_t>(convergence());
+      out.size[k] = static_cast<std::uint8_t>(this->size());
+    }
   }
 
   template <int Rows, int Cols>
@@ -399,8 +471,64 @@ class FilterFor final : public AnyFilter<Scalar> {
     out.push_back(Scalar(streak.widened));
   }
 
+  static void append_mixture(const Robust& filter, std::vector<Scalar>& out) {
+    if constexpr (kSums) {
+      if (filter.params().components == 1) return;
+      const auto& state = filter.state();
+      out.push_back(Scalar(state.accepted));
+      out.push_back(Scalar(state.headings));
+      out.push_back(state.bend);
+      out.push_back(Scalar(filter.size()));
+      for (int k = 0; filter.size() > 1 && k < filter.size(); ++k) {
+        out.push_back(filter.weight(k));
+        append(filter.component(k).x, out);
+        auto p = filter.component(k).P;
+        math::mirror_lower(p);
+        append(p, out);
+      }
+    }
+  }
+
+  /// Belief, rule and mixture together.
+  static Status restore_belief(Robust& filter, const typename Robust::BeliefType& belief,
+                               const typename Robust::Rule& rule, const Scalar* mixture,
+                               std::size_t numbers) {
+    if constexpr (kSums) {
+      const int most = filter.params().components;
+      if (most > 1) {
+        for (int i : {0, 1, 3}) {
+          const bool counts = numbers >= 4 && math::within(mixture[i], Scalar(0), Scalar(255));
+          if (!counts) return Status::kBadParameter;
+        }
+        const int size = static_cast<int>(mixture[3]);
+        if (size < 1 || size > most || numbers != mixture_numbers(size, N)) {
+          return Status::kBadParameter;
+        }
+        auto state = filter.state();
+        state.accepted = static_cast<std::uint8_t>(mixture[0]);
+        state.headings = static_cast<std::uint8_t>(mixture[1]);
+        state.bend = mixture[2];
+        state.mixture.size = static_cast<std::uint8_t>(size);
+        const Scalar* number = mixture + 4;
+        for (int k = 0; size > 1 && k < size; ++k) {
+          state.mixture.weight[k] = *number++;
+          number = take(number, state.mixture.component[k].x);
+          number = take(number, state.mixture.component[k].P);
+        }
+        return filter.restore(belief, rule, state);
+      }
+    }
+    return numbers == 0 ? filter.restore(belief, rule) : Status::kBadParameter;
+  }
+  template <int Rows, int Cols>
+  static const Scalar* take(const Scalar* numbers, Matrix<Scalar, Rows, Cols>& out) {
+    std::copy_n(numbers, Rows * Cols, out.data());
+    return numbers + Rows * Cols;
+  }
+
   static Status restore_robust(Robust& filter, const Scalar* x, const Scalar* P,
-                               const Scalar* input, const Scalar* recovery) {
+                               const Scalar* input, const Scalar* recovery, const Scalar* mixture,
+                               std::size_t mixture_size) {
     typename Robust::BeliefType belief;
     for (int i = 0; i < N; ++i) belief.x(i) = x[i];
     for (int i = 0; i < N * N; ++i) belief.P.data()[i] = P[i];
@@ -413,7 +541,7 @@ class FilterFor final : public AnyFilter<Scalar> {
     streak.widened = static_cast<std::uint8_t>(recovery[8]);
     streak.variance = recovery[1];
     for (int i = 0; i < 6; ++i) streak.recent.data()[i] = recovery[2 + i];
-    const Status status = filter.restore(belief, rule);
+    const Status status = restore_belief(filter, belief, rule, mixture, mixture_size);
     if (status == Status::kOk) {
       typename Event::Input values;
       for (int i = 0; i < kMaxInputs; ++i) values(i) = input[i];
@@ -438,6 +566,7 @@ class FilterFor final : public AnyFilter<Scalar> {
   }
 
   Adaptive filter_;
+  int headings_;  // of which the start is
   Scalar late_s_;
   Memory memory_;
 };
@@ -449,6 +578,9 @@ std::unique_ptr<AnyFilter<Scalar>> make_filter(
     const std::shared_ptr<const AnyProcess<Scalar>>& process,
     const FilterOptions<Scalar>& options) {
   const auto own = std::static_pointer_cast<const ProcessFor<Scalar, N>>(process);
+  const bool possible = options.components <= (N > 1 ? kMaxComponents : 1) &&
+                        options.headings >= 1 && (options.headings == 1 || N > 2);
+  if (!possible) return nullptr;
   std::unique_ptr<FilterFor<Scalar, N>> made(new FilterFor<Scalar, N>(own, options));
   if (made->filter().check() != Status::kOk) return nullptr;
   return std::unique_ptr<AnyFilter<Scalar>>(made.release());

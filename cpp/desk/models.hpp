@@ -10,12 +10,16 @@
 #include <limits>
 #include <memory>
 #include <string>
+#include <type_traits>
 #include <utility>
+#include <vector>
 
+#include "auvest/filters/gaussian_sum.hpp"
 #include "auvest/filters/robust.hpp"
 #include "auvest/runtime/any_kernel.hpp"
 #include "auvest/runtime/any_linearisation.hpp"
 #include "auvest/runtime/any_recovery.hpp"
+#include "auvest/slat/definite.hpp"
 #include "desk/members.hpp"
 #include "desk/report.hpp"
 
@@ -54,8 +58,9 @@ struct AnySensor {
 template <class Scalar, int N>
 struct ProcessFor : AnyProcess<Scalar> {
   using Input = Vector<Scalar, kMaxInputs>;
+  const bool translates;  ///< as ProcessModel's kTranslation
 
-  explicit ProcessFor(int u) : AnyProcess<Scalar>(N, u) {}
+  ProcessFor(int u, bool moves_all_alike) : AnyProcess<Scalar>(N, u), translates(moves_all_alike) {}
 
   virtual Status predict(const AnyLinearisation<Scalar>& how, Belief<Scalar, N>& belief, Scalar dt,
                          const Input& input) const = 0;
@@ -76,7 +81,28 @@ struct RuntimeProcess {
   Scalar position_variance(const Belief<Scalar, N>& belief, Scalar dt) const {
     return model->position_variance(belief, dt, input);
   }
+  bool translates() const { return model->translates; }
 };
+
+/// After a step of `Filter` from the belief `before`: what restore() does not take has its lost
+/// pivots raised to what the format resolves. Those are of a covariance that rounding has left
+/// indefinite or with a variance of 0, in single precision by a measurement that is 1e7 times as
+/// precise as what it corrects. False where that is none either: not finite. No bit of a belief
+/// that restore() takes changes, nor of one so small that what is lost is subnormal.
+template <class Filter>
+bool keep_belief(const typename Filter::BeliefType& before, typename Filter::BeliefType& belief) {
+  using Scalar = typename Filter::Scalar;
+  if (Filter::check_belief(belief) == Status::kOk) return true;
+  typename Filter::Covariance raised = belief.P;
+  for (int i = 0; i < Filter::kStates; ++i) {
+    const Scalar floor = math::pivot_floor(before.P(i, i));
+    if (floor < (std::numeric_limits<Scalar>::min)()) return true;
+    raised(i, i) = math::larger(raised(i, i), floor);
+  }
+  belief.P = raised;
+  raise_pivots(belief.P);
+  return Filter::check_belief(belief) == Status::kOk;
+}
 
 /// A Gaussian filter whose process and whose linearisation are chosen at run time.
 template <class Scalar_, int N>
@@ -91,7 +117,10 @@ class RuntimeGaussian
       : Base(process, how.check()), how_(how) {}
 
   Status predict_belief(BeliefType& belief, Scalar dt) const {
-    return this->process().model->predict(how_, belief, dt, this->process().input);
+    const BeliefType before = belief;
+    const Status status = this->process().model->predict(how_, belief, dt, this->process().input);
+    if (status != Status::kOk) return status;
+    return keep_belief<RuntimeGaussian>(before, belief) ? Status::kOk : Status::kOverflow;
   }
 
   template <class Model, class Point>
@@ -112,14 +141,68 @@ class RuntimeGaussian
 template <class Scalar, int N>
 struct PlacedSensor;
 
+const int kMaxComponents = 255;  ///< of a Gaussian sum
+
+/// An array as long as it is asked to be.
+template <class Element>
+class Sequence {
+ public:
+  void resize(int size) { elements_.resize(static_cast<std::size_t>(size)); }
+  Element& operator[](int k) { return elements_[static_cast<std::size_t>(k)]; }
+  const Element& operator[](int k) const { return elements_[static_cast<std::size_t>(k)]; }
+
+ private:
+  std::vector<Element> elements_;
+};
+
+/// As ComponentArrays, but only as many as a filter asks for: most ask for none.
+template <class Scalar, int N>
+struct ComponentSequences {
+  std::uint8_t size = 1;
+  Sequence<Scalar> weight;
+  Sequence<Belief<Scalar, N>> component;
+
+  void reserve(int most) {
+    weight.resize(most);
+    component.resize(most);
+  }
+};
+
+/// The robust update with any kernel and recovery; its belief is one that restore() takes.
+template <class Scalar>
+struct RuntimeRule : RobustUpdate<AnyKernel<Scalar>, AnyRecovery<Scalar>> {
+  using Base = RobustUpdate<AnyKernel<Scalar>, AnyRecovery<Scalar>>;
+  using Base::Base;
+
+  template <int N, class... Arguments>
+  Status operator()(Belief<Scalar, N>& belief, Arguments&&... arguments) {
+    const Belief<Scalar, N> before = belief;
+    const Base rule = *this;
+    const Status status = Base::operator()(belief, std::forward<Arguments>(arguments)...);
+    if (status != Status::kOk || keep_belief<RuntimeGaussian<Scalar, N>>(before, belief)) {
+      return status;
+    }
+    belief = before;
+    static_cast<Base&>(*this) = rule;
+    return Status::kOverflow;
+  }
+};
+
+template <class Scalar, int N>
+using RuntimeInside = Robust<RuntimeGaussian<Scalar, N>, RuntimeRule<Scalar>>;
+
+/// A Gaussian sum, of one component where nothing else is asked for; one state is no position.
+template <class Scalar, int N>
+using RuntimeSum = std::conditional_t<
+    (N > 1), GaussianSum<RuntimeInside<Scalar, N>, kMaxComponents, ComponentSequences<Scalar, N>>,
+    RuntimeInside<Scalar, N>>;
+
 /// The same with any kernel and recovery, and with sensors that are chosen at run time.
 template <class Scalar_, int N>
-class RuntimeRobust : public Robust<RuntimeGaussian<Scalar_, N>,
-                                    RobustUpdate<AnyKernel<Scalar_>, AnyRecovery<Scalar_>>> {
+class RuntimeRobust : public RuntimeSum<Scalar_, N> {
  public:
   using Scalar = Scalar_;
-  using Base =
-      Robust<RuntimeGaussian<Scalar, N>, RobustUpdate<AnyKernel<Scalar>, AnyRecovery<Scalar>>>;
+  using Base = RuntimeSum<Scalar, N>;
   using Base::Base;
   using Base::update;
 
@@ -158,7 +241,7 @@ class ProcessOf final : public ProcessFor<typename Process::Scalar, Process::kSt
 
   /// `count`: how many of the numbers of the model's input count.
   explicit ProcessOf(const Process& process, int count = kInputs)
-      : Base(count), process_(process) {}
+      : Base(count, Process::kTranslation), process_(process) {}
 
   const Process& process() const { return process_; }
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from auvest import metrics as metrics
     from auvest import montecarlo as montecarlo
     from auvest import simulation as simulation
+    from auvest._core import Convergence as Convergence
     from auvest._core import Decision as Decision
     from auvest._core import SelfTestPart as SelfTestPart
     from auvest._core import SelfTestResult as SelfTestResult
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from auvest.errors import ModelError as ModelError
     from auvest.filters import Aukf as Aukf
     from auvest.filters import Ekf as Ekf
+    from auvest.filters import Mixture as Mixture
     from auvest.filters import Report as Report
     from auvest.filters import RobustEkf as RobustEkf
     from auvest.filters import RobustUkf as RobustUkf
@@ -44,9 +46,11 @@ if TYPE_CHECKING:
     from auvest.models import Depth as Depth
     from auvest.models import FunctionProcess as FunctionProcess
     from auvest.models import FunctionSensor as FunctionSensor
+    from auvest.models import HeadingSpeed as HeadingSpeed
     from auvest.models import LeaderRange as LeaderRange
     from auvest.models import MeasurementModel as MeasurementModel
     from auvest.models import Odometry as Odometry
+    from auvest.models import PlanarHull as PlanarHull
     from auvest.models import Position as Position
     from auvest.models import ProcessModel as ProcessModel
     from auvest.models import RangeBearing as RangeBearing
@@ -82,6 +86,7 @@ else:
         "CompassMotion": "slat.models",
         "ConstantAcceleration": "models",
         "ConstantVelocity": "slat.models",
+        "Convergence": "_core",
         "CoordinatedTurn": "slat.models",
         "CovarianceBudget": "intervals",
         "DeadReckoning": "slat",
@@ -94,16 +99,19 @@ else:
         "FunctionProcess": "models",
         "FunctionSensor": "models",
         "Hampel": "kernels",
+        "HeadingSpeed": "models",
         "Huber": "kernels",
         "Igg": "kernels",
         "Imm": "slat.models",
         "LeaderRange": "models",
         "MahalanobisInterval": "intervals",
         "MeasurementModel": "models",
+        "Mixture": "filters",
         "ModelError": "errors",
         "Odometry": "models",
         "Outage": "slat",
         "PiecewiseAcceleration": "slat.models",
+        "PlanarHull": "models",
         "Position": "models",
         "ProcessModel": "models",
         "RangeBearing": "models",

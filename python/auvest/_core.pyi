@@ -1,5 +1,5 @@
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar, Generic, TypeAlias, TypedDict, TypeVar
+from typing import Any, ClassVar, Generic, TypeAlias, TypedDict, TypeVar, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -49,7 +49,10 @@ class Status(_Enum):
 class StatusError(ValueError):
     status: Status
 
+@overload
 def describe(status: Status) -> str: ...
+@overload
+def describe(convergence: Convergence) -> str: ...
 
 # self_test.hpp
 
@@ -103,6 +106,7 @@ class Random(metaclass=_Type):
 
 UNCLEAR: int
 MAX_PLACE: int
+MAX_COMPONENTS: int
 
 class _Process(Generic[_Array], metaclass=_Type):
     def __init__(self, *args: object, **kwargs: object) -> None: ...
@@ -174,6 +178,15 @@ class _FilterOptions(TypedDict):
     tolerance: float
     late_s: float
     longest_step_s: float
+    components: int
+    headings: int
+
+class Convergence(_Enum):
+    not_converged: ClassVar[Convergence]
+    ambiguous: ClassVar[Convergence]
+    settling: ClassVar[Convergence]
+    settled: ClassVar[Convergence]
+    __members__: ClassVar[dict[str, Convergence]]
 
 class _Filter(Generic[_Array], metaclass=_Type):
     def __init__(
@@ -198,6 +211,10 @@ class _Filter(Generic[_Array], metaclass=_Type):
     def report(self) -> dict[str, Any] | None: ...
     @property
     def law(self) -> dict[str, float] | None: ...
+    @property
+    def mixture(self) -> tuple[_Array, _Array, _Array]: ...
+    @property
+    def convergence(self) -> Convergence: ...
     @property
     def status(self) -> Status: ...
     @property
@@ -489,6 +506,7 @@ def shortest_curve(
 
 def mission_defaults() -> _Params: ...
 def mission_sources() -> list[str]: ...
+def mission_curve_plan(path: str) -> npt.NDArray[np.float64]: ...
 def mission_source(name: str, track: str, interval_s: float) -> dict[str, Any]: ...
 def fly_missions(scenario: Mapping[str, Any]) -> dict[str, npt.NDArray[Any]]: ...
 

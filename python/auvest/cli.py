@@ -20,13 +20,14 @@ from auvest.commands.exit_codes import EXIT_CODES
 
 #: First line of help of each command, by the words that call it.
 COMMANDS: Mapping[tuple[str, ...], str] = {
-    ("capture",): "Record what the sketch tracking_loop reports: a CSV file, a figure, a table.",
+    ("capture",): "Record what a sketch reports: a CSV file, a figure, a table.",
     ("check",): "Check a log before it is used: what is there, and what may be wrong with it.",
     ("cost",): (
         "Measure a filter with your models on the simulated MEGA2560: flash, RAM, stack, cycles."
     ),
     ("filters",): "List the filters: what each takes, and where it runs with the same bits.",
     ("import",): "Turn a published recording into logs for 'auvest replay'.",
+    ("library",): "Write the Arduino library: a zip for the IDE or PlatformIO.",
     ("mission",): "Play the vehicle that the sketch mission steers, on a board or simulated.",
     ("replay",): "Replay recorded runs through a filter.",
     ("version",): "Show the version, and what this build lacks.",

@@ -1,12 +1,12 @@
 """What the sketch ``mission`` and its vehicle say to each other: all that knows the format here.
 
-Its twin on the chip is ``mission_line.h`` of the sketch, which names every line. Lines are framed
-as in :mod:`auvest.telemetry`. A number is digits with or without a sign and a point; the chip makes
-a float of it as digits / 10^decimals, each rounded once, and :func:`number` gives the same bits.
+Its twin on the chip is ``mission_line.h`` of the sketch, which names every line. Lines and numbers
+are those of :mod:`auvest.telemetry`.
 """
 
 from __future__ import annotations
 
+import math
 import re
 import struct
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from auvest.telemetry import LineError, body_of, frame
+from auvest.telemetry import LineError, body_of, decimal, frame, number
 
 #: Of each sensor: name of its line, bit in ``heard``, decimals, and the places of its numbers among
 #: the seven readings (heading, pitch, pitch rate, yaw rate, speed ahead, to starboard, depth).
@@ -28,8 +28,6 @@ SENSORS = (
 ALL_HEARD = 15
 #: Fixes that the chip takes in one sample.
 FIXES = 2
-
-_NUMBER = re.compile(r"(-?)(\d*)(?:\.(\d*))?")
 
 
 @dataclass(frozen=True)
@@ -79,38 +77,23 @@ def command(line: str) -> Command | None:
 
 def start(x_m: float, y_m: float, heading_rad: float) -> str:
     """Write where the vehicle is put into the water."""
-    return frame(f"START,{x_m:.4f},{y_m:.4f},{heading_rad:.6f}")
+    return frame(f"START,{decimal(x_m, 4)},{decimal(y_m, 4)},{decimal(heading_rad, 6)}")
 
 
 def readings(sample: int, values: Sequence[float] | npt.NDArray[np.float64]) -> list[str]:
     """Write the seven readings of a sample; a sensor with a NaN is silent."""
     lines = []
     for name, _, decimals, places in SENSORS:
-        numbers = [f"{value:.{decimals}f}" for value in values[places]]
-        if "nan" not in numbers:
+        if all(map(math.isfinite, values[places])):
+            numbers = [decimal(value, decimals) for value in values[places]]
             lines.append(frame(",".join([name, str(sample), *numbers])))
     return lines
 
 
 def fix(sample: int, range_m: float, bearing_rad: float, delay_s: float) -> str:
     """Write a fix that was asked for at a sample, and how long after that it was so."""
-    return frame(f"FIX,{sample},{range_m:.3f},{bearing_rad:.5f},{delay_s:.4f}")
-
-
-def number(text: str) -> np.float32:
-    """Read a number with the bits of the chip.
-
-    Raises
-    ------
-    LineError
-        If it is none, or has more than nine digits.
-    """
-    match = _NUMBER.fullmatch(text)
-    sign, whole, decimals = match.groups(default="") if match else ("", "", "")
-    if not 1 <= len(whole + decimals) <= 9:
-        raise LineError(f"not a number of up to nine digits: {text!r}")
-    size = np.float32(int(whole + decimals)) / np.float32(10 ** len(decimals))
-    return -size if sign else size
+    numbers = decimal(range_m, 3), decimal(bearing_rad, 5), decimal(delay_s, 4)
+    return frame(",".join(["FIX", str(sample), *numbers]))
 
 
 @dataclass

@@ -251,6 +251,36 @@ def capture_figure(
     return figure
 
 
+def columns_figure(time_s: Floats, columns: Mapping[str, Floats], *, title: str) -> Figure:
+    """Draw columns over time, each in a panel of its own, those with nothing in them left out.
+
+    Parameters
+    ----------
+    time_s : ndarray, shape (T,)
+        Times, s; without any, the samples are counted.
+    columns : mapping of str to ndarray, shape (T,)
+        By their names; NaN where unknown.
+    title : str
+        Title of the whole.
+    """
+    drawn = {name: values for name, values in columns.items() if np.isfinite(values).any()}
+    timed = bool(np.isfinite(time_s).all())
+    across = time_s if timed else np.arange(len(time_s))
+    rows = max(1, -(-len(drawn) // 3))
+    figure = new_figure((10.0, 1.0 + 1.5 * rows), title)
+    axes = figure.subplots(rows, 3, sharex=True, squeeze=False)
+    for panel, (name, values) in zip(axes.flat, drawn.items(), strict=False):
+        panel.plot(across, values, ".-", color=BLUE, linewidth=1.0, markersize=3)
+        style(panel)
+        panel.set_title(name, loc="left")
+        panel.title.set_fontsize(10.5)
+    for panel in axes.flat[len(drawn) :]:
+        panel.set_visible(False)
+    for panel in axes[-1]:
+        panel.set_xlabel("time / s" if timed else "sample")
+    return figure
+
+
 def slave_figure(
     truth: Floats,
     estimate: Floats,

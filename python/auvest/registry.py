@@ -25,8 +25,9 @@ class Filter:
     title : str
         As pages and pictures name it.
     family : {"gaussian", "slat"}
-        The Kalman filters take any process and sensor, a robust kernel and an interval policy;
-        those that localise and track take a motion and a sonar.
+        The Kalman filters take any process and sensor, a robust kernel, an interval policy and, for
+        ranges from a start that is not known, several components; those that localise and track
+        take a motion and a sonar.
     replay, chip, parity, budget : bool
         Whether ``auvest replay`` takes it; whether it is built for the vehicle; whether the parity
         tests show the same bits on every target; whether docs/budgets.md has what it costs there.
@@ -59,6 +60,7 @@ class Filter:
             "sensors": self.sensors,
             "kernel": self.family == "gaussian",
             "policy": self.family == "gaussian",
+            "components": self.family == "gaussian",
             "note": self.note,
         }
 

@@ -158,8 +158,8 @@ class Capture(Attack):
     """`auvest capture` from a pseudo-terminal on which a thread speaks as the board."""
 
     _COLUMNS = (
-        "sample,time_s,dt_s,range_m,bearing_rad,desired_x_m,desired_y_m,x_m,y_m,vx_m_s,vy_m_s,"
-        "ax_m_s2,ay_m_s2,P00_m2,P10_m2,P11_m2,nis,interval_s,status,missed,refused,late,awake_us"
+        "sample#,time_s,dt_s,range_m,bearing_rad,desired_x_m,desired_y_m,x_m,y_m,vx_m_s,vy_m_s,"
+        "ax_m_s2,ay_m_s2,P00_m2,P10_m2,P11_m2,nis,interval_s,status#,missed#,refused#,late#,awake_us#"
     )
     _STEPS = 40
 
@@ -173,7 +173,8 @@ class Capture(Attack):
                 zero, one = (struct.pack(">f", value).hex() for value in (0.0, 1.0))
                 cells = [str(k), f"{0.5 * k:.6f}", *[one] * 11, one, zero, one, one, one]
                 row = ",".join(["AUV", *cells, "0", "0", "0", "0", str(awake_us)])
-                lines = f"# columns: {self._COLUMNS}\r\n{telemetry.frame(row)}\r\n"
+                header = telemetry.frame(f"COLUMNS,AUV,{self._COLUMNS}")
+                lines = f"{header}\r\n{telemetry.frame(row)}\r\n"
                 os.write(master, lines.encode("latin-1"))
                 time.sleep(1e-3)
 
@@ -191,7 +192,7 @@ class Capture(Attack):
             return "truncated"
         lines = rows.splitlines()[1:]
         tags = {line.rpartition(",")[2] for line in lines}
-        if not rows.endswith("\n") or {line.count(",") for line in lines} != {22}:
+        if not rows.endswith("\n") or {line.count(",") for line in lines} != {23}:
             return "truncated"
         if len(tags) != 1 or len(lines) != samples:
             return "mixed"

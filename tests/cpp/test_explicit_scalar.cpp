@@ -357,6 +357,38 @@ TEST_CASE("explicit scalar: the vehicles") {
   CHECK(fly_vehicles<ExplicitDouble>() == fly_vehicles<double>());
 }
 
+/// The hull as a process, corrected by compass and log.
+template <class Scalar>
+std::vector<double> run_planar_hull() {
+  using Process = auvest::PlanarHull<Scalar>;
+  auvest::Ekf<Process> filter{Process()};
+  typename Process::State x;
+  typename Process::Covariance P;
+  for (int i = 0; i < 8; ++i) {
+    x(i) = Scalar(i == 3 ? 1.5 : 0);
+    for (int j = 0; j < 8; ++j) P(i, j) = Scalar(i == j ? 1 : 0);
+  }
+  REQUIRE(filter.reset(x, P) == auvest::Status::kOk);
+  typename Process::Input input;
+  input(0) = Scalar(0.1);
+  input(1) = Scalar(15);
+  auvest::Vector<Scalar, 3> z;
+  z(0) = Scalar(0.05);
+  z(1) = Scalar(1.4);
+  z(2) = Scalar(0.1);
+  std::vector<double> numbers;
+  for (int k = 0; k < 5; ++k) {
+    REQUIRE(filter.predict(Scalar(0.25), input) == auvest::Status::kOk);
+    REQUIRE(filter.update(z, auvest::HeadingSpeed<Scalar, 8>()).status == auvest::Status::kOk);
+    for (int i = 0; i < 8; ++i) numbers.push_back(double(filter.x()(i)));
+  }
+  return numbers;
+}
+
+TEST_CASE("explicit scalar: a hull as a process") {
+  CHECK(run_planar_hull<ExplicitDouble>() == run_planar_hull<double>());
+}
+
 /// Guidance and control over a plan, with the model-aided filter between them.
 template <class Scalar>
 std::vector<double> run_guidance() {

@@ -72,7 +72,7 @@ def play(board):
                 sample = telemetry.requested_sample(event.text)
                 if sample is None:
                     row = reader.read(event.text)
-                    if row is None:
+                    if not isinstance(row, dict):
                         run.comments.append((event.time_s, event.text))
                     else:
                         run.rows.append(row)
@@ -103,6 +103,7 @@ def on_the_desk():
             np.float32([0.2, 2.0, 0.1, 0.2, 0.01, 0.02]),
             np.diag(sigma * sigma),
             process=ConstantAcceleration(discretisation="euler"),
+            sensors=RangeBearing(largest_range_m=75.0),
             policy=policy,
             alpha=np.float32(1e-6),
             dtype="float32",

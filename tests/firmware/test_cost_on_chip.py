@@ -11,7 +11,6 @@ import pytest
 
 from auvest.errors import ModelError
 from auvest.firmware import cost, simulator
-from auvest.firmware.package import PackageError
 from auvest.firmware.sketch import SketchError
 from auvest.registry import FILTERS
 
@@ -196,7 +195,7 @@ def test_a_missing_tool_is_named(monkeypatch, tmp_path):
     board = shutil.which("true")
     monkeypatch.setenv("AUVEST_BOARD", board)
     without("avr-g++")
-    with pytest.raises(PackageError, match="install gcc-avr"):
+    with pytest.raises(SketchError, match="install gcc-avr"):
         cost.measure(**options)
     without("arduino-builder")
     with pytest.raises(SketchError, match="install arduino-builder"):

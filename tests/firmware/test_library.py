@@ -10,9 +10,11 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 import auvest
 from auvest import _headers
+from auvest.cli import app
 from auvest.firmware import package
 
 CATEGORIES = {
@@ -300,7 +302,9 @@ def test_eigen_is_what_is_included_and_no_more(compile_cpp, folder, tmp_path):
         compile_cpp(compiler, "#include <auvest.h>\n", "-M", *options, f"-I{source}")
         found |= set((tmp_path / "object").read_text().replace("\\\n", " ").split())
     brought = {str(path) for path in (source / "Eigen").rglob("*") if path.is_file()}
-    assert brought == {name for name in found if name.startswith(str(source / "Eigen"))}
+    asked = {name for name in found if name.startswith(str(source / "Eigen"))}
+    assert asked <= brought
+    assert len(brought) < 1.1 * len(asked)  # some stand behind conditions that never hold
     vector_code = {path.name for path in (source / "Eigen/src/Core/arch").iterdir()} - {"Default"}
     assert not vector_code
 
@@ -315,7 +319,21 @@ def test_missing_eigen_names_the_package(monkeypatch, tmp_path):
         package.package(tmp_path)
 
 
-def test_missing_compiler_names_the_package(monkeypatch, tmp_path):
+def test_command(tmp_path, library):
+    """Under the name that is given, or into the folder; nothing else is left."""
+    for given, written in (("my.zip", "my.zip"), ("", library.name)):
+        folder = tmp_path / written
+        folder.mkdir()
+        called = CliRunner().invoke(app, ["library", "--output", str(folder / given), "--json"])
+        assert called.exit_code == 0, called.output
+        assert json.loads(called.stdout)["file"] == str(folder / written)
+        assert (folder / written).read_bytes() == library.read_bytes()
+        assert [path.name for path in folder.iterdir()] == [written]
+    called = CliRunner().invoke(app, ["library", "--output", str(tmp_path / "none" / "my.zip")])
+    assert called.exit_code == 1
+    assert "none" in called.stderr
+
+
+def test_no_compiler_takes_part(monkeypatch, tmp_path, library):
     monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(package.PackageError, match=r"avr-g\+\+ is not installed: install gcc-avr"):
-        package.package(tmp_path)
+    assert package.archive() == library.read_bytes()

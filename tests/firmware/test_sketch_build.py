@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-import auvest
 from auvest.firmware import sketch
 
 EMPTY = "void setup() {}\nvoid loop() {}\n"
@@ -319,10 +318,3 @@ def test_command_line(library, tmp_path, root):
     done = subprocess.run([*command, "--define", "N=4"], capture_output=True, text=True, cwd=root)
     assert done.returncode == 1
     assert done.stderr.startswith("auvest.firmware.sketch: s does not compile")
-
-
-def test_package_command_line(tmp_path, root):
-    command = [sys.executable, "-m", "auvest.firmware.package", "--output", tmp_path / "out"]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=root)
-    assert done.returncode == 0, done.stderr
-    assert Path(done.stdout.strip()) == tmp_path / "out" / f"auvest-{auvest.__version__}.zip"

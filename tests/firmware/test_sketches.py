@@ -206,7 +206,7 @@ def test_pattern_looks_like_no_common_value(root):
     ("file", "old", "new"),
     [
         # A buffer that takes all the RAM, and a reserve that is more than there is.
-        ("telemetry.h", "kCapacity = 80 +", "kCapacity = 7000 +"),
+        ("telemetry.h", "kCapacity = 88 +", "kCapacity = 7000 +"),
         ("config.h", "kStackReserve = 2048", "kStackReserve = 8000"),
     ],
 )

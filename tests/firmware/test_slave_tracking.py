@@ -75,7 +75,7 @@ def play(board):
     """Return a function that runs the sketch for a number of samples, with its instruments."""
 
     def play(elf, samples, motion=motion, echo=echo):
-        run, reader = Run(), telemetry.Reader("SLAVE")
+        run, reader = Run(), telemetry.Reader()
         with board(elf, watch=[TRIGGER_PIN], limit_s=2.0 * samples + 10) as running:
             for event in running:
                 if isinstance(event, PinChange):
@@ -91,7 +91,7 @@ def play(board):
                         break
                 else:
                     row = reader.read(event.text)
-                    if row is None:
+                    if not isinstance(row, dict):
                         run.comments.append(event.text)
                     else:
                         run.rows.append(row)

@@ -4,6 +4,8 @@ import subprocess
 
 import numpy as np
 
+import auvest
+
 pytest_plugins = ["board_support"]
 
 # Three stations, a craft at rest; then one station 900 m off, so that the filter recovers. Written:
@@ -83,7 +85,31 @@ inline void write(float value) { fwrite(&value, sizeof value, 1, stdout); }
 """
 
 
-def test_the_chip_has_the_bits_of_the_host(compile_avr, run_board, root, tmp_path):
+def in_python():
+    """The same numbers from Python."""
+    f = auvest.RobustEkf(
+        [12.0, 9.0],
+        np.eye(2) * np.float32(1e8),
+        process=auvest.SpeedHeading(),
+        sensors=auvest.LeaderRange(),
+        kernel="igg",
+        components=16,
+        dtype="float32",
+    )
+    k = np.arange(40)
+    places = np.array([(0, 0), (120, 0), (60, 90)], "f4")[k % 3]
+    row = k.astype("f4")
+    at = np.column_stack([row * np.float32(0.38) + 46, row * np.float32(0.32) + 53])
+    apart = at - places
+    z = np.sqrt(apart[:, 0] * apart[:, 0] + apart[:, 1] * apart[:, 1])
+    places[:, 0] -= np.where(k < 16, np.float32(0), np.float32(900))
+    inputs = np.tile(np.array([0.1, 0.0, 0.7], "f4"), (40, 1))
+    found = f.run(z, dt=5.0, input=inputs, place=places)
+    belief = [found.x, found.P[:, 0, :1], found.P[:, 1, :2]]
+    return np.column_stack([*belief, found.mixture_size, found.convergence]).astype("f4")
+
+
+def test_the_chip_has_the_bits_of_the_host_and_of_python(compile_avr, run_board, root, tmp_path):
     headers = ["-ffp-contract=off", f"-I{root / 'cpp/include'}", "-isystem", "/usr/include/eigen3"]
     (tmp_path / "host").mkdir()
     (tmp_path / "host" / "output.hpp").write_text(HOST)
@@ -106,6 +132,7 @@ def test_the_chip_has_the_bits_of_the_host(compile_avr, run_board, root, tmp_pat
     found = np.frombuffer(run.output, "<f4")
     rows = wanted.reshape(40, 7)
     assert found.tobytes() == wanted.tobytes()
+    assert in_python().tobytes() == wanted.tobytes()
 
     x, size, says = rows[:, :2], rows[:, 5], rows[:, 6]
     k = np.arange(40)[:, None]

@@ -118,6 +118,10 @@ PRECISE_CASES = [
 ]
 
 
+#: Those that can range in the plane, and so start anywhere.
+RANGING_CASES = [case for case in PRECISE_CASES if ALL[case[1]].state[:2] == ("x_m", "y_m")]
+
+
 def of_unit(name: str) -> tuple[float, float]:
     return next(value for unit, value in UNITS.items() if name.endswith(unit))
 
@@ -155,6 +159,16 @@ def make(kind, name: str, dtype: str = "float64", **options: Any):
     process = ALL[name]
     options = {"sensors": sensors_for(process), **options}
     return kind(*start(process), process=process, dtype=dtype, **options)
+
+
+def make_lost(kind, name: str, dtype: str = "float64", **options: Any):
+    """The same with a start that is known to some kilometres, of up to 16 components."""
+    process = ALL[name]
+    x0, p0 = start(process)
+    wide = np.ones(len(x0))
+    wide[:2] = 2e3
+    options = {"kernel": "igg", "components": 16, "sensors": sensors_for(process), **options}
+    return kind(x0, p0 * np.outer(wide, wide), process=process, dtype=dtype, **options)
 
 
 @dataclasses.dataclass
@@ -297,6 +311,9 @@ def row(f, width: int) -> dict[str, np.ndarray]:
     columns["iterations"] = np.array(0 if report is None else report.iterations, np.uint8)
     if f.policy is not None:
         columns["interval_s"] = np.array(f.interval, f.dtype)
+    if f.components > 1:
+        columns["convergence"] = np.array(int(f.convergence), np.uint8)
+        columns["mixture_size"] = np.array(len(f.mixture), np.uint8)
     return columns
 
 
@@ -308,6 +325,8 @@ def readable(f) -> dict[str, bytes]:
     if isinstance(f.policy, auvest.MahalanobisInterval):
         for name in ("tau", "ratio", "mahalanobis_squared"):
             found[name] = np.float64(getattr(f, name)).tobytes()
+    for name in ("weight", "x", "P"):
+        found[f"mixture {name}"] = getattr(f.mixture, name).tobytes()
     return found
 
 

@@ -35,11 +35,13 @@ from auvest.commands.capture import SimulatedSonar
 from auvest.simulation.tracking import Noise, Track
 from auvest.telemetry import LineError, Reader
 
-COLUMNS = (
-    "sample,time_s,dt_s,range_m,bearing_rad,desired_x_m,desired_y_m,x_m,y_m,vx_m_s,vy_m_s,"
-    "ax_m_s2,ay_m_s2,P00_m2,P10_m2,P11_m2,nis,interval_s,status,missed,refused,late,awake_us"
+#: As the sketch names them: whole numbers with #.
+NAMES = (
+    "sample#,time_s,dt_s,range_m,bearing_rad,desired_x_m,desired_y_m,x_m,y_m,vx_m_s,vy_m_s,"
+    "ax_m_s2,ay_m_s2,P00_m2,P10_m2,P11_m2,nis,interval_s,status#,missed#,refused#,late#,awake_us#"
 )
-HEADER = f"# columns: {COLUMNS}"
+HEADER = telemetry.frame(f"COLUMNS,AUV,{NAMES}")
+COLUMNS = "section," + NAMES.replace("#", "")
 
 
 def bits(value: float) -> str:
@@ -69,22 +71,34 @@ def call(*arguments: str) -> Result:
 # ---- Text ----------------------------------------------------------------------------------------
 
 
-def test_checksum_is_that_of_nmea() -> None:
-    # The example that every description of NMEA 0183 has.
-    body = "GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,"
-    assert telemetry.frame(body) == f"${body}*47"
-    assert telemetry.body_of(f"${body}*47") == body
+def test_checksum_is_crc_32() -> None:
+    # The check value that every catalogue of CRCs has for it.
+    assert telemetry.frame("123456789") == "$123456789*cbf43926"
+    assert telemetry.body_of("$123456789*CBF43926") == "123456789"
 
 
 @pytest.mark.parametrize(
     "line",
-    ["", "$", "$AUV", "AUV*55", "$AUV*", "$AUV*5", "$AUV*zz", "$AUV*00", "$AUV*4055", "x$AUV*55",
-     "$A$UV*55", "$AUV*55\r"],
+    ["", "$", "$AUV", "AUV*cbdd6335", "$AUV*", "$AUV*5", "$AUV*zzdd6335", "$AUV*cbdd6336",
+     "$AUV*cbdd63355", "x$AUV*cbdd6335", "$A$UV*cbdd6335", "$AUV*cbdd6335\r"],
 )  # fmt: skip
 def test_a_line_that_is_not_whole_is_refused(line: str) -> None:
-    assert telemetry.body_of(telemetry.frame("AUV")) == "AUV"
+    assert telemetry.body_of("$AUV*cbdd6335") == "AUV"
     with pytest.raises(LineError):
         telemetry.body_of(line)
+
+
+@pytest.mark.parametrize("line", ["$AUV,1,2*55", "# columns: sample,time_s"])
+def test_a_sketch_of_an_earlier_version_is_told_to_be_loaded_anew(line: str) -> None:
+    with pytest.raises(LineError, match=r"earlier version.*: load it anew"):
+        Reader().read(line)
+
+
+def test_two_lost_points_are_noticed() -> None:
+    """Exclusive or of all characters does not see it: 0.7 m became 700,000 m."""
+    whole = telemetry.answer(10, 0.7, 1.107149)
+    with pytest.raises(LineError):
+        telemetry.body_of(whole.replace(".", ""))
 
 
 def test_every_changed_character_is_noticed() -> None:
@@ -102,7 +116,7 @@ def test_every_changed_character_is_noticed() -> None:
 
 def test_numbers_keep_their_bits() -> None:
     reader = Reader()
-    reader.read("# columns: sample,time_s,a,b,c,d,e")
+    reader.read(telemetry.frame("COLUMNS,AUV,sample#,time_s,a,b,c,d,e"))
     row = reader.read(telemetry.frame("AUV,12345678,12345678.5,33d6bf95,80000000,,1.25,ovf"))
     assert row is not None
     assert row["sample"] == 12345678  # eight digits, and yet a whole number
@@ -114,26 +128,33 @@ def test_numbers_keep_their_bits() -> None:
     assert math.isnan(row["e"])  # what Arduino prints for more than 2^32
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["sample", "time_s", "resamplings", "status", "missed", "refused", "late", "awake_us"],
-)
-def test_eight_digits_of_a_count_are_a_number_and_of_a_float_its_bits(name: str) -> None:
-    reader = Reader("SLAVE")
-    reader.read(f"# columns: {name},speed_m_s")
-    row = reader.read(telemetry.frame("SLAVE,40490000,40490000"))
-    assert row == {name: 40490000.0, "speed_m_s": 3.140625}  # 2 (1 + 0x490000 / 2^23)
+def test_eight_digits_of_a_count_are_a_number_and_of_a_float_its_bits() -> None:
+    reader = Reader()
+    reader.read(telemetry.frame("COLUMNS,MINE,count#,speed_m_s"))
+    row = reader.read(telemetry.frame("MINE,40490000,40490000"))
+    assert row == {"count": 40490000.0, "speed_m_s": 3.140625}  # 2 (1 + 0x490000 / 2^23)
 
 
 def test_samples_need_the_names_of_their_columns() -> None:
     reader = Reader()
-    with pytest.raises(LineError, match="reset the board"):
-        reader.read(sample_line(1))
+    assert reader.read(sample_line(1)) is None
+    assert reader.others == {"AUV"}
     reader.read(HEADER)
+    assert reader.others == set()
     with pytest.raises(LineError, match="2 values for 23 columns"):
         reader.read(telemetry.frame("AUV,1,2"))
     with pytest.raises(LineError, match="not a number"):
         reader.read(telemetry.frame("AUV," + ",".join(["one"] * 23)))
+
+
+def test_the_kind_that_is_described_first_is_read() -> None:
+    reader = Reader()
+    reader.read(telemetry.frame("COLUMNS,ONE,a"))
+    reader.read(telemetry.frame("COLUMNS,TWO,b"))
+    assert (reader.kind, reader.columns) == ("ONE", ("a",))
+    assert reader.read(telemetry.frame("ONE,1")) == {"a": 1.0}
+    assert reader.read(telemetry.frame("TWO,1")) is None
+    assert reader.others == {"TWO"}
 
 
 @pytest.mark.parametrize(
@@ -148,22 +169,46 @@ def test_samples_need_the_names_of_their_columns() -> None:
 )
 def test_a_number_that_no_sketch_sends_is_a_damaged_line(cell: str, message: str) -> None:
     reader = Reader()
-    reader.read("# columns: sample,a")
-    line = f"$AUV,1,{cell}*00" if not cell.isascii() else telemetry.frame(f"AUV,1,{cell}")
+    reader.read(telemetry.frame("COLUMNS,AUV,sample#,a"))
+    line = f"$AUV,1,{cell}*00000000" if not cell.isascii() else telemetry.frame(f"AUV,1,{cell}")
     with pytest.raises(LineError, match=message):
         reader.read(line)
-    assert telemetry.requested_sample(f"$PING,{cell}*00") is None
+    assert telemetry.requested_sample(f"$PING,{cell}*00000000") is None
     if cell.isascii():
         assert telemetry.requested_sample(telemetry.frame(f"PING,{cell}")) is None
 
 
-@pytest.mark.parametrize("names", ["sample,time_s,sample", "sample,,a", "sample,ti\u00e9me", "1a"])
-def test_damaged_names_of_columns_are_refused_and_the_last_ones_stay(names: str) -> None:
+@pytest.mark.parametrize(
+    "text",
+    ["AUV,sample,time_s,sample", "AUV,sample#,sample", "AUV,sample,,a", "AUV,1a", "AUV,a##", "AUV",
+     "", "auv,a", ",a"],
+)  # fmt: skip
+def test_what_is_no_description_is_refused_and_the_last_one_stays(text: str) -> None:
     reader = Reader()
-    reader.read("# columns: sample,a")
-    with pytest.raises(LineError, match="names of the columns are damaged"):
-        reader.read(f"# columns: {names}")
-    assert reader.columns == ("sample", "a")
+    reader.read(telemetry.frame("COLUMNS,AUV,sample#,a"))
+    with pytest.raises(LineError, match="not a description of columns"):
+        reader.read(telemetry.frame(f"COLUMNS,{text}"))
+    assert (reader.kind, reader.columns) == ("AUV", ("sample", "a"))
+
+
+def test_other_columns_than_before_are_another_sketch() -> None:
+    reader = Reader()
+    reader.read(HEADER)
+    with pytest.raises(LineError, match="another sketch"):
+        reader.read(telemetry.frame("COLUMNS,AUV,sample#,a"))
+    assert reader.read(sample_line(1)) is not None
+
+
+def test_a_start_of_the_board_says_why() -> None:
+    boot = Reader().read(telemetry.frame("BOOT,17,8"))
+    assert boot == telemetry.Boot(17, 8)
+    reasons = {1: "power came on", 3: "power came on and its reset pin", 8: "its watchdog"}
+    for cause, reason in reasons.items():
+        assert telemetry.Boot(1, cause).reason == reason
+    assert telemetry.Boot(1, 0).reason.startswith("unknown")
+    for body in ("BOOT", "BOOT,1", "BOOT,1,2,3", "BOOT,a,1", "BOOT,1,-1"):
+        with pytest.raises(LineError, match="not a start"):
+            Reader().read(telemetry.frame(body))
 
 
 def test_other_lines_are_no_samples() -> None:
@@ -174,7 +219,7 @@ def test_other_lines_are_no_samples() -> None:
 
 def test_requests() -> None:
     assert telemetry.requested_sample(telemetry.frame("PING,17")) == 17
-    for line in ("$PING,17*00", "$PING,", telemetry.frame("PING,x"), sample_line(1), "#"):
+    for line in ("$PING,17*00000000", "$PING,", telemetry.frame("PING,x"), sample_line(1), "#"):
         assert telemetry.requested_sample(line) is None
     assert telemetry.answer(17, 1.5, -0.25) == telemetry.frame("SONAR,17,1.500000,-0.250000")
 
@@ -193,9 +238,13 @@ def test_an_answer_is_given_to_the_micrometre_and_microradian() -> None:
     assert body == "SONAR,3,12.345678,-1.234568"
 
 
-def test_a_checksum_has_two_digits() -> None:
-    assert telemetry.frame("AB") == "$AB*03"  # 0x41 xor 0x42
-    assert telemetry.body_of("$AB*03") == "AB"
+def test_a_number_for_a_sketch_has_nine_digits_at_most() -> None:
+    """The reader on the chip takes no more, nor exponents."""
+    assert telemetry.answer(1, 12345.6789123, 0.5) == telemetry.frame("SONAR,1,12345.6789,0.500000")
+    assert telemetry.decimal(-999999999.0, 3) == "-999999999"
+    for value in (999999999.6, -1e30, math.nan, math.inf):
+        with pytest.raises(ValueError, match="nine digits"):
+            telemetry.decimal(value, 3)
 
 
 # ---- The simulated sonar -------------------------------------------------------------------------
@@ -300,7 +349,7 @@ def port() -> Iterator[PortWithBoard]:
 
 def test_port_is_recorded_to_the_bit(port: PortWithBoard, tmp_path: Path) -> None:
     def script(board: PortWithBoard) -> None:
-        board.say("ra,1*22")  # the rest of a line that began before we listened
+        board.say("ra,1*22222222")  # the rest of a line that began before we listened
         board.say("# auvest tracking_loop")
         board.say(HEADER)
         for k in range(1, 6):
@@ -333,6 +382,59 @@ def test_port_is_recorded_to_the_bit(port: PortWithBoard, tmp_path: Path) -> Non
     assert sorted(path.name for path in output.iterdir()) == [
         ".auvest.json", "figure.png", "record.csv", "results.json",
     ]  # fmt: skip
+
+
+def test_a_board_that_restarts_begins_a_section(port: PortWithBoard, tmp_path: Path) -> None:
+    """Once its line is heard, once it is lost; counters of the sections add up."""
+
+    def script(board: PortWithBoard) -> None:
+        board.say(telemetry.frame("BOOT,4,1"))
+        board.say(HEADER)
+        for k in (1, 2, 3, 3):
+            board.say(sample_line(k, missing=k == 3))
+        board.say(telemetry.frame("BOOT,5,8"))
+        board.say(HEADER)
+        for k in (1, 2):
+            board.say(sample_line(k, missing=True))
+        for k in (1, 2):
+            board.say(sample_line(k))
+
+    port.speak(script)
+    output = tmp_path / "dive"
+    result = call("--port", port.name, "--steps", "7", "--output", str(output), "--json")
+    assert result.exit_code == 0, result.output
+    values = json.loads(result.stdout)["results"]
+    assert values["restarts"] == [
+        {"after_s": 1.5, "section": 2, "reason": "its watchdog"},
+        {"after_s": 1.0, "section": 3, "reason": "not said: that line was lost"},
+    ]
+    assert "the board restarted after 1.5 s" in plain(result.stderr)
+    assert values["damaged_lines"] == 1  # sample 3 came twice
+    assert values["missed"] == 2  # one in each of the first two sections
+    assert values["duration_s"] == pytest.approx(3.0)  # 0.5 to 1.5, then 1 s and 1 s
+    rows = (output / "record.csv").read_text().splitlines()[1:]
+    assert [row.split(",")[:2] for row in rows] == [
+        ["1", "1"], ["1", "2"], ["1", "3"], ["2", "1"], ["2", "2"], ["3", "1"], ["3", "2"],
+    ]  # fmt: skip
+
+
+def test_any_sketch_that_names_its_columns_is_recorded(port: PortWithBoard, tmp_path: Path) -> None:
+    def script(board: PortWithBoard) -> None:
+        board.say(telemetry.frame("COLUMNS,TANK,sample#,depth_m,valve#"))
+        for k in range(1, 4):
+            board.say(telemetry.frame(f"TANK,{k},{bits(0.1 * k)},12345678"))
+
+    port.speak(script)
+    result = call("--port", port.name, "--steps", "3", "--output", str(tmp_path / "tank"), "--json")
+    assert result.exit_code == 0, result.output
+    values = json.loads(result.stdout)["results"]
+    assert values["samples"] == 3
+    assert values["missed"] is None
+    assert (tmp_path / "tank" / "figure.png").stat().st_size > 1000
+    header, *rows = (tmp_path / "tank" / "record.csv").read_text().splitlines()
+    assert header == "section,sample,depth_m,valve"
+    assert np.float32(rows[1].split(",")[2]) == np.float32(0.2)
+    assert rows[1].endswith(",12345678")
 
 
 def test_play_sonar_answers_each_request(port: PortWithBoard, tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """The wheel and the sdist: what they contain, and that the wheel works outside the source tree."""
 
+import hashlib
 import json
 import os
 import re
@@ -12,6 +13,7 @@ from importlib.metadata import version
 import pytest
 
 import auvest
+from auvest.firmware import package
 
 
 @pytest.fixture(scope="module")
@@ -143,14 +145,17 @@ def test_wheel_outside_the_source_tree(wheel, declared_version, tmp_path, run):
     dependencies = [p for p in sys.path if p.endswith("site-packages")]
     code = (
         f"import sys; sys.path += {dependencies!r}\n"
-        "import auvest._core, auvest.cli, importlib.metadata\n"
+        "import auvest._core, auvest.cli, hashlib, importlib.metadata\n"
+        "from auvest.firmware import package\n"
         "print(importlib.metadata.version('auvest'), auvest.__file__, auvest._core.__file__, "
-        "sep='\\n', flush=True)\n"
+        "hashlib.sha256(package.archive()).hexdigest(), sep='\\n', flush=True)\n"
         "auvest.cli.app(['simulate', 'aukf', '--runs', '2'])"
     )
-    found, *files = run(python, "-c", code).splitlines()[:3]
+    found, *files, library = run(python, "-c", code).splitlines()[:4]
     assert found == declared_version
     assert all(file.startswith(str(tmp_path)) for file in files)
+    # The Arduino library, from what the wheel brings: byte for byte that of the source tree.
+    assert library == hashlib.sha256(package.archive()).hexdigest()
 
 
 def test_sdist_has_what_git_tracks(root, tmp_path, declared_version, run):

@@ -3,6 +3,8 @@
 
 #include "auvest/config.hpp"  // first: it says what is wrong with a compiler
 
+#include "auvest/board/crc32.hpp"
+#include "auvest/board/line.hpp"
 #include "auvest/control/autopilot.hpp"
 #include "auvest/control/depth_control.hpp"
 #include "auvest/control/heading_control.hpp"
@@ -45,10 +47,12 @@
 #include "auvest/models/constant_velocity.hpp"
 #include "auvest/models/coordinated_turn.hpp"
 #include "auvest/models/depth.hpp"
+#include "auvest/models/heading_speed.hpp"
 #include "auvest/models/leader_range.hpp"
 #include "auvest/models/linear.hpp"
 #include "auvest/models/odometry.hpp"
 #include "auvest/models/piecewise_acceleration.hpp"
+#include "auvest/models/planar_hull.hpp"
 #include "auvest/models/position.hpp"
 #include "auvest/models/range_bearing.hpp"
 #include "auvest/models/range_bearing_elevation.hpp"

@@ -75,6 +75,16 @@ static_assert(sizeof(float) == 4 && FLT_RADIX == 2 && FLT_MANT_DIG == 24,
 #define AUVEST_OUTLINE_HOT
 #endif
 
+// Tables of 32-bit words that an AVR leaves in flash: in RAM they would take room from the filters.
+#if defined(__AVR__)
+#include <avr/pgmspace.h>
+#define AUVEST_IN_FLASH PROGMEM
+#define AUVEST_FROM_FLASH(address) pgm_read_dword(address)
+#else
+#define AUVEST_IN_FLASH
+#define AUVEST_FROM_FLASH(address) (*(address))
+#endif
+
 // The Arduino library brings some routines in assembler; without its sources they are C++.
 #if defined(AUVEST_ARDUINO_LIBRARY) && defined(__AVR_HAVE_MUL__) && defined(__AVR_HAVE_JMP_CALL__)
 #define AUVEST_AVR_KERNELS

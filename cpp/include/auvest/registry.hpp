@@ -10,8 +10,10 @@
 #include "auvest/models/body_velocity.hpp"
 #include "auvest/models/constant_acceleration.hpp"
 #include "auvest/models/depth.hpp"
+#include "auvest/models/heading_speed.hpp"
 #include "auvest/models/leader_range.hpp"
 #include "auvest/models/odometry.hpp"
+#include "auvest/models/planar_hull.hpp"
 #include "auvest/models/position.hpp"
 #include "auvest/models/range_bearing.hpp"
 #include "auvest/models/range_bearing_elevation.hpp"
@@ -29,14 +31,16 @@
   X("SpeedHeadingCurrent", SpeedHeadingCurrent<Scalar>)        \
   X("Odometry", Odometry<Scalar>)                              \
   X("WhiteAcceleration2", WhiteAcceleration<Scalar, 2>)        \
-  X("WhiteAcceleration3", WhiteAcceleration<Scalar, 3>)
+  X("WhiteAcceleration3", WhiteAcceleration<Scalar, 3>)        \
+  X("PlanarHull", PlanarHull<Scalar>)
 
-#define AUVEST_SENSORS(X)                                          \
-  X("RangeBearing", N >= 2, RangeBearing<Scalar, N>)               \
-  X("LeaderRange", N >= 2, LeaderRange<Scalar, N>)                 \
-  X("Position2", N >= 2, Position<Scalar, N, 2>)                   \
-  X("Position3", N == 6, Position<Scalar, N, 3>)                   \
-  X("Depth", N == 6, Depth<Scalar, N>)                             \
-  X("BodyVelocity2", N == 4 || N == 6, BodyVelocity<Scalar, N, 2>) \
-  X("BodyVelocity3", N == 6, BodyVelocity<Scalar, N, 3>)           \
-  X("RangeBearingElevation", N == 6, RangeBearingElevation<Scalar, N>)
+#define AUVEST_SENSORS(X)                                              \
+  X("RangeBearing", N >= 2, RangeBearing<Scalar, N>)                   \
+  X("LeaderRange", N >= 2, LeaderRange<Scalar, N>)                     \
+  X("Position2", N >= 2, Position<Scalar, N, 2>)                       \
+  X("Position3", N == 6, Position<Scalar, N, 3>)                       \
+  X("Depth", N == 6, Depth<Scalar, N>)                                 \
+  X("BodyVelocity2", N == 4 || N == 6, BodyVelocity<Scalar, N, 2>)     \
+  X("BodyVelocity3", N == 6, BodyVelocity<Scalar, N, 3>)               \
+  X("RangeBearingElevation", N == 6, RangeBearingElevation<Scalar, N>) \
+  X("HeadingSpeed", N == 8, HeadingSpeed<Scalar, N>)

@@ -1,14 +1,14 @@
 // Instruments on the other end of Serial. The chip asks one of them for a sample by its number; the
 // answer is believed only if it is whole, from this instrument, for this sample and in time.
 //
-//     chip to instrument   $PING,17*hh
-//     instrument to chip   $SONAR,17,4.125,1.0923*hh     sample, two numbers
+//     chip to instrument   $PING,17*hhhhhhhh
+//     instrument to chip   $SONAR,17,4.125,1.0923*hhhhhhhh     sample, two numbers
+//
+// Numbers are as auvest/board/line.hpp says: up to nine digits, no exponent.
 #pragma once
 
 #include <Arduino.h>
 #include <auvest.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include "auvest_text_line.h"
 #include "auvest_wake_timer.h"
@@ -28,7 +28,7 @@ class SerialInstruments {
 
   /// Sends a request of this name.
   void ask(const char* name) {
-    LineOut<24> request;
+    StoredLine<32> request;
     request.start(name);
     request.field(sample_);
     request.finish();
@@ -43,9 +43,14 @@ class SerialInstruments {
       wake_timer::sleep_until([&] { return Serial.available() > 0 || line.sendable(); }, limit);
       line.send_some();
       while (Serial.available() > 0) {
-        const LineIn::Result result = line_.take(static_cast<char>(Serial.read()));
-        if (result == LineIn::Result::kMore) continue;
-        if (result == LineIn::Result::kLine && parse(line_.text(), name, answer)) return true;
+        const auvest::LineIn::Result result = line_.take(static_cast<char>(Serial.read()));
+        if (result == auvest::LineIn::Result::kMore) continue;
+        float numbers[2];
+        if (result == auvest::LineIn::Result::kLine &&
+            auvest::read_answer(line_.text(), name, sample_, numbers)) {
+          answer = Answer(numbers[0], numbers[1]);
+          return true;
+        }
         ++refused_;
       }
       if (wake_timer::reached(limit)) return false;
@@ -56,26 +61,9 @@ class SerialInstruments {
   uint32_t refused() const { return refused_; }
 
  private:
-  bool parse(const char* text, const char* name, Answer& answer) const {
-    const size_t size = strlen(name);
-    if (strncmp(text, name, size) != 0 || text[size] != ',') return false;
-    char* end;
-    if (strtoul(text + size + 1, &end, 10) != sample_) return false;
-    Answer numbers;
-    for (int i = 0; i < 2; ++i) {
-      if (*end != ',') return false;
-      const char* const begin = end + 1;
-      numbers(i) = static_cast<float>(strtod(begin, &end));
-      if (end == begin || !auvest::math::is_finite(numbers(i))) return false;
-    }
-    if (*end != '\0') return false;
-    answer = numbers;
-    return true;
-  }
-
   uint32_t sample_ = 0;
   uint32_t refused_ = 0;
-  LineIn line_;
+  auvest::LineIn line_;
 };
 
 }  // namespace auvest_board

@@ -1,9 +1,11 @@
-"""``auvest capture``: record what the sketch ``tracking_loop`` reports, on a board or simulated.
+"""``auvest capture``: record what a sketch reports, on a board or simulated.
 
 The sketch runs on an Arduino at --port, or on a simulated one with --simulator, where the vehicle
 and its sonar are simulated too. --play-sonar simulates them for a board that has no sonar.
+Any sketch is recorded that names its columns, as tracking_loop does ($COLUMNS, telemetry.h).
 Every sample is in the CSV file as soon as it has come, with all the bits of its floats, until the
-end in a folder whose name ends in .unfinished; Ctrl-C ends a recording and keeps it.
+end in a folder whose name ends in .unfinished; Ctrl-C ends a recording and keeps it. Where the
+board was reset under way, a new section of the file begins.
 
 Examples
 --------
@@ -39,7 +41,7 @@ from auvest.commands.session import Floats, Session
 from auvest.simulation import paper_aukf
 from auvest.simulation.paper_aukf import observed_positions
 from auvest.simulation.tracking import Noise, Track
-from auvest.telemetry import LineError, Reader, Row
+from auvest.telemetry import Boot, LineError, Reader, Row
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -106,6 +108,11 @@ class SimulatedSonar:
         delay = self._processing_s + 2 * distance / SOUND_M_S
         return telemetry.answer(sample, distance + range_error, bearing), delay
 
+    def restart(self) -> None:
+        """Put the vehicle at the start of its track: the board has begun anew."""
+        self._start_s = None
+        self.truth.clear()
+
     def _draw(self) -> tuple[float, float, bool]:
         noise, random = self._noise, self._random
         unit = random.uniform(size=2) if noise.kind == "uniform" else random.normal(size=2)
@@ -115,6 +122,25 @@ class SimulatedSonar:
         if noise.centred:
             errors -= replace(noise, centred=False).mean
         return float(errors[0]), float(errors[1]), bool(random.uniform() < noise.dropout)
+
+
+@dataclass(frozen=True)
+class Restart:
+    """The board has begun anew under way.
+
+    Attributes
+    ----------
+    after_s : float
+        The time of the last sample before it, s.
+    section : int
+        The section that it begins, of those in the file.
+    reason : str
+        Why.
+    """
+
+    after_s: float
+    section: int
+    reason: str
 
 
 @dataclass
@@ -128,9 +154,11 @@ class Recording:
     sonar : SimulatedSonar or None
         Who answers the sketch; None: somebody else.
     rows : list of dict
-        Samples.
-    triggered_s : dict of int to float
-        When each sample was asked for, in the time of who calls `hear`.
+        Samples; the first column counts the sections, which begin where the board does.
+    triggered_s : dict of (int, int) to float
+        When each sample of each section was asked for, in the time of who calls `hear`.
+    restarts : list of Restart
+        Where the board has begun anew.
     damaged : int
         Lines that could not be read.
     last_damage : str
@@ -142,13 +170,15 @@ class Recording:
     path: Path
     sonar: SimulatedSonar | None
     rows: list[Row] = field(default_factory=list)
-    triggered_s: dict[int, float] = field(default_factory=dict)
+    triggered_s: dict[tuple[int, int], float] = field(default_factory=dict)
+    restarts: list[Restart] = field(default_factory=list)
     damaged: int = 0
     last_damage: str = ""
     awake_share: float = math.nan
 
     def __post_init__(self) -> None:
         self._reader = Reader()
+        self._section = 1
         self._file = self.path.open("w", encoding="utf-8", newline="")
 
     def close(self) -> None:
@@ -159,22 +189,48 @@ class Recording:
         """Take a line, and give the sonar's answer to it with its delay (s), if there is one."""
         sample = telemetry.requested_sample(line)
         if sample is not None:
-            self.triggered_s[sample] = triggered_s
+            self.triggered_s[self._section, sample] = triggered_s
             return None if self.sonar is None else self.sonar.measure(sample, triggered_s)
         try:
-            row = self._reader.read(line)
+            said = self._reader.read(line)
+            if isinstance(said, Boot):
+                self._begin(said.reason)
+            elif said is not None:
+                self._add(said)
         except LineError as error:
             self.damaged += 1
             self.last_damage = str(error)
-            return None
-        if row is not None:
-            self._add(row)
         return None
 
+    @property
+    def trouble(self) -> str:
+        """What keeps samples from coming, as far as the lines tell."""
+        if not self._reader.kind and self._reader.others:
+            kinds = ", ".join(sorted(f"${kind}" for kind in self._reader.others))
+            return f"lines have come ({kinds}), but the names of no columns: reset the board"
+        return self.last_damage
+
+    def _begin(self, reason: str) -> None:
+        """Begin a new section, if there is one to end."""
+        if not self.rows or self.rows[-1]["section"] != self._section:
+            return
+        self._section += 1
+        self.restarts.append(Restart(self.rows[-1].get("time_s", math.nan), self._section, reason))
+        if self.sonar is not None:
+            self.sonar.restart()
+
     def _add(self, row: Row) -> None:
+        if self.rows and self.rows[-1]["section"] == self._section and "sample" in row:
+            sample, last = row["sample"], self.rows[-1]["sample"]
+            if sample == last:
+                raise LineError(f"sample {sample:g} has come twice")
+            if sample < last:
+                self._begin("not said: that line was lost")
+        row = {"section": self._section, **row}
         if self.sonar is not None:
             unknown = (math.nan, math.nan)
-            row["true_x_m"], row["true_y_m"] = self.sonar.truth.get(int(row["sample"]), unknown)
+            sample = int(row.get("sample", 0))
+            row["true_x_m"], row["true_y_m"] = self.sonar.truth.get(sample, unknown)
         if not self.rows:
             self._file.write(",".join(row) + "\n")
         # Nine digits are all the bits of a float, twelve are a time to 1 us.
@@ -192,22 +248,40 @@ class Recording:
         return np.stack([self.column(name) for name in names], axis=-1)
 
     @property
+    def elapsed_s(self) -> Floats:
+        """Times of the samples, s, those of each section behind the one before."""
+        time_s = self.column("time_s")
+        elapsed_s = time_s.copy()
+        for begin in np.flatnonzero(np.diff(self.column("section"))) + 1:
+            elapsed_s[begin:] = time_s[begin:] + elapsed_s[begin - 1]
+        return elapsed_s
+
+    def at_the_ends(self, name: str) -> Floats:
+        """Collect what a column has at the end of each section."""
+        ends = np.append(np.diff(self.column("section")) > 0, True)
+        return self.column(name)[ends]
+
+    @property
     def announced_s(self) -> float:
         """The longer of the last two intervals that the sketch has announced, s."""
-        return max((row["interval_s"] for row in self.rows[-2:]), default=0.0)
+        return max((row.get("interval_s", 0.0) for row in self.rows[-2:]), default=0.0)
 
     @property
     def timing_error_s(self) -> float:
         """How far the triggers lie from the moments in the lines, at most, s."""
-        pairs = [
-            (row["time_s"], self.triggered_s[int(row["sample"])])
-            for row in self.rows
-            if int(row["sample"]) in self.triggered_s
-        ]
-        if not pairs:
-            return math.nan
-        said, seen = np.array(pairs).T
-        return float(np.abs((seen - seen[0]) - (said - said[0])).max())
+        worst = math.nan
+        for section in range(1, self._section + 1):
+            pairs = [
+                (row["time_s"], self.triggered_s[section, int(row["sample"])])
+                for row in self.rows
+                if row["section"] == section
+                and (section, int(row.get("sample", 0))) in self.triggered_s
+            ]
+            if pairs:
+                said, seen = np.array(pairs).T
+                error = np.abs((seen - seen[0]) - (said - said[0])).max()
+                worst = float(np.fmax(worst, error))
+        return worst
 
 
 def command(
@@ -298,12 +372,17 @@ def command(
                 recording.close()
     if not recording.rows:
         recording.path.unlink(missing_ok=True)
-        why = session.trouble or recording.last_damage or "interrupted"
+        why = session.trouble or recording.trouble or "interrupted"
         code = ExitCode.INTERRUPTED if session.interrupted else ExitCode.FAILED
         terminal.fail(f"no sample has come: {why}", code)
 
     values = measures(recording, simulated=simulator is not None)
     source = settings["source"]
+    for restart in recording.restarts:
+        terminal.warn(
+            f"the board restarted after {restart.after_s:.6g} s: section {restart.section} begins; "
+            f"why: {restart.reason}"
+        )
     session.add("record", path)
     if not no_figure:
         session.draw(_figure, recording, sensor, source)
@@ -381,29 +460,29 @@ def _listen(port: str, baud: int, recording: Recording, wanted: Callable[[], boo
                 patience_s = max(SILENCE_S, 3 * recording.announced_s)
                 if now - last_s > patience_s:
                     raise _ConnectionLost(
-                        f"{port}: no sample for {patience_s:g} s: does the board run "
-                        f"tracking_loop, at {baud} baud? {recording.last_damage}".rstrip()
+                        f"{port}: no sample for {patience_s:g} s: does the board run a sketch "
+                        f"that names its columns, at {baud} baud? {recording.trouble}".rstrip()
                     )
     except (serial.SerialException, OSError) as error:
         raise _ConnectionLost(f"{port}: {error}") from None
 
 
 def measures(recording: Recording, *, simulated: bool) -> dict[str, Any]:
-    """Compute the numbers of the table."""
-    time_s = recording.column("time_s")
-    last = recording.rows[-1]
+    """Compute the numbers of the table; NaN where the sketch does not report them."""
     nis = recording.column("nis")
     known = nis[np.isfinite(nis)]
-    span = float(time_s[-1] - time_s[0])
+    span = float(recording.elapsed_s[-1] - recording.elapsed_s[0])
     awake = float(recording.column("awake_us")[1:].sum()) * 1e-6
     error = recording.columns("x_m", "y_m") - recording.columns("true_x_m", "true_y_m")
+    status = recording.column("status")
     return {
-        "samples": len(time_s),
-        "missed": int(last["missed"]),
-        "refused_answers": int(last["refused"]),
-        "late": int(last["late"]),
-        "not_ok": int((recording.column("status") != 0).sum()),
+        "samples": len(recording.rows),
+        "missed": _count(recording.at_the_ends("missed")),
+        "refused_answers": _count(recording.at_the_ends("refused")),
+        "late": _count(recording.at_the_ends("late")),
+        "not_ok": _count(np.where(np.isfinite(status), status != 0, np.nan)),
         "damaged_lines": recording.damaged,
+        "restarts": [asdict(restart) for restart in recording.restarts],
         "duration_s": span,
         "mean_interval_s": float(recording.column("dt_s").mean()),
         "nis_mean": float(known.mean()) if known.size else math.nan,
@@ -414,37 +493,53 @@ def measures(recording: Recording, *, simulated: bool) -> dict[str, Any]:
     }
 
 
+def _count(values: Floats) -> int | float:
+    total = float(values.sum())
+    return int(total) if math.isfinite(total) else math.nan
+
+
 def _figure(recording: Recording, sensor: RangeBearing, source: str) -> Figure:
     from auvest import plots  # here, because matplotlib takes long to import
 
+    title = f"{Path(source).name}: {len(recording.rows)} samples"
+    if not {"x_m", "y_m", "nis", "interval_s", "range_m"} <= set(recording.rows[0]):
+        drawn = [name for name in recording.rows[0] if name not in ("section", "sample", "time_s")]
+        return plots.columns_figure(
+            recording.elapsed_s, {name: recording.column(name) for name in drawn}, title=title
+        )
     return plots.capture_figure(
         recording.columns("x_m", "y_m"),
         recording.columns("desired_x_m", "desired_y_m"),
         observed_positions(recording.columns("range_m", "bearing_rad"), sensor.station),
         recording.columns("true_x_m", "true_y_m"),
         station=sensor.station,
-        time_s=recording.column("time_s"),
+        time_s=recording.elapsed_s,
         interval_s=recording.column("interval_s"),
         sigma_m=np.sqrt(recording.column("P00_m2") + recording.column("P11_m2")),
         nis=recording.column("nis"),
-        title=f"{Path(source).name}: {len(recording.rows)} samples",
+        title=title,
     )
 
 
 def _table(values: dict[str, Any], source: str) -> Table:
-    rows = [
-        ("missed measurements", f"{values['missed']}", "predicted only"),
-        ("answers refused", f"{values['refused_answers']}", "corrupt, or to another sample"),
-        ("deadlines missed", f"{values['late']}", "by more than 1 ms"),
-        ("status not ok", f"{values['not_ok']}", "samples"),
-        ("lines damaged", f"{values['damaged_lines']}", "on their way from the board"),
-        ("mean interval / s", f"{values['mean_interval_s']:.4f}", ""),
-        ("NIS, mean", f"{values['nis_mean']:.3f}", "expected 2; below: cautious"),
-    ]
+    counts = (
+        ("missed", "missed measurements", "predicted only"),
+        ("refused_answers", "answers refused", "corrupt, or to another sample"),
+        ("late", "deadlines missed", "by more than 1 ms"),
+        ("not_ok", "status not ok", "samples"),
+        ("damaged_lines", "lines damaged", "on their way from the board"),
+    )
+    rows = [(name, f"{values[key]}", note) for key, name, note in counts if values[key] >= 0]
+    if values["restarts"]:
+        rows.append(("restarts of the board", f"{len(values['restarts'])}", "a section each"))
+    if math.isfinite(values["mean_interval_s"]):
+        rows.append(("mean interval / s", f"{values['mean_interval_s']:.4f}", ""))
+    if math.isfinite(values["nis_mean"]):
+        rows.append(("NIS, mean", f"{values['nis_mean']:.3f}", "expected 2; below: cautious"))
     if math.isfinite(values["awake_share_simulated"]):
         share = 100 * values["awake_share_simulated"]
         rows.append(("time awake", f"{share:.2f} %", "counted by the simulator"))
-    else:
+    elif math.isfinite(values["awake_share_by_board"]):
         share = 100 * values["awake_share_by_board"]
         rows.append(("time awake", f"{share:.2f} %", "counted by the board, without interrupts"))
     if math.isfinite(values["worst_timing_error_s"]):

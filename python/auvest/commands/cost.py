@@ -34,7 +34,6 @@ from auvest.commands.console import Terminal
 from auvest.commands.exit_codes import ExitCode
 from auvest.commands.version import version
 from auvest.firmware.cost import KERNELS, POLICIES, Cost, measure
-from auvest.firmware.package import PackageError
 from auvest.firmware.simulator import SimulatorError
 from auvest.firmware.sketch import SketchError
 from auvest.registry import FILTERS
@@ -130,7 +129,7 @@ def command(
                 seed=seed,
                 progress=progress,
             )
-        except (BoardError, FileNotFoundError, PackageError, SimulatorError, SketchError) as error:
+        except (BoardError, FileNotFoundError, SimulatorError, SketchError) as error:
             terminal.fail(str(error), ExitCode.FAILED)
     if new is not None:
         terminal.publish(new)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from auvest.filters._base import GaussianFilter, Residual, Sensors
 from auvest.filters.ekf import Ekf, RobustEkf
-from auvest.filters.results import Report, RunResult
+from auvest.filters.results import Mixture, Report, RunResult
 from auvest.filters.ukf import Aukf, RobustUkf, Ukf
 
 __all__ = [
     "Aukf",
     "Ekf",
     "GaussianFilter",
+    "Mixture",
     "Report",
     "Residual",
     "RobustEkf",

@@ -34,14 +34,14 @@ from auvest._arguments import (
     impossible_range,
     require_range,
 )
-from auvest._core import Decision, Status
+from auvest._core import Convergence, Decision, Status
 from auvest._interrupts import first_slice, in_slices
 from auvest._state import describe, pack, require, unpack
 from auvest.errors import FilterError, Interrupted
-from auvest.filters.results import Report, RunResult
+from auvest.filters.results import Mixture, Report, RunResult
 from auvest.intervals import FixedInterval, IntervalPolicy, MahalanobisInterval, core_interval
 from auvest.kernels import Kernel, KernelName, RejectionStreak, Unit, as_kernel, core_kernel
-from auvest.models import MeasurementModel, ProcessModel, from_description
+from auvest.models import SENSORS, LeaderRange, MeasurementModel, ProcessModel, from_description
 from auvest.models._base import UNSAVED
 from auvest.models.functions import FunctionProcess, FunctionSensor, require_none_raised
 
@@ -59,6 +59,7 @@ _UNIT = Unit()
 _POSITION = ("x_m", "y_m", "z_m")
 _REPORT = ("innovation", "S", "standardised", "weight")
 _LARGEST_REPORT = 6  # numbers of a measurement
+_RING = 8  # components, at least
 _STATUSES = {int(status) for status in Status.__members__.values()}
 _DECISIONS = {int(decision) for decision in Decision.__members__.values()}
 
@@ -89,6 +90,8 @@ class GaussianFilter:
         policy: IntervalPolicy | None = None,
         late_s: float = 0.0,
         longest_step_s: float = 3600.0,
+        components: int = 1,
+        headings: int = 1,
         residual: Residual = "innovation",
         max_iterations: int = _UPDATE["max_iterations"],
         tolerance: float = _UPDATE["tolerance"],
@@ -122,6 +125,9 @@ class GaussianFilter:
             "max_iterations": as_integer("max_iterations", max_iterations, 2, 255),
             "tolerance": as_number("tolerance", tolerance, "not negative"),
         }
+        self._components = as_integer("components", components, 1, _core.MAX_COMPONENTS)
+        self._headings = as_integer("headings", headings, 1, _core.MAX_COMPONENTS // _RING)
+        self._require_place_for_components()
         self._parameters = {} if parameters is None else parameters
         states = len(self._process.state)
         state = as_array("x0", x0, (states,), self._dtype)
@@ -162,6 +168,33 @@ class GaussianFilter:
             if growth[i] > 0 and is_coarse(float(state[i]), min(float(growth[i]), largest)):
                 raise ValueError(far_from_origin("x0", state[place], self._dtype))
 
+    def _require_place_for_components(self) -> None:
+        """Refuse several components where no range could make a ring of them."""
+        if self._headings > 1:
+            if self._process.state[2:3] not in (("theta_rad",), ("heading_rad",)):
+                raise ValueError(
+                    "headings is for a process whose third state is theta_rad, its heading, not "
+                    f"{type(self._process).__name__}"
+                )
+            if self._components < _RING * self._headings:
+                raise ValueError(
+                    f"{self._headings} headings need at least {_RING * self._headings} components, "
+                    f"not {self._components}"
+                )
+        if self._components == 1:
+            return
+        if self._components < _RING:
+            raise ValueError(
+                f"components must be 1, or at least {_RING}: a ring of {self._components} has gaps"
+            )
+        if self._process.state[:2] != _POSITION[:2]:
+            raise ValueError(
+                "components is for a process whose first states are x_m and y_m, not "
+                f"{type(self._process).__name__}"
+            )
+        if self._sensors and all(_makes_no_ring(model) for model in self._sensors.values()):
+            raise ValueError("components is for ranges: none of sensors is a LeaderRange")
+
     def _build(self) -> None:
         self._filter = self._core_filter(self._policy)
         self._handles = {
@@ -186,6 +219,8 @@ class GaussianFilter:
             "tolerance": self._options["tolerance"],
             "late_s": self._options["late_s"],
             "longest_step_s": self._options["longest_step_s"],
+            "components": self._components,
+            "headings": self._headings,
         }
         try:
             return getattr(_core, f"Filter_{name}")(
@@ -289,6 +324,28 @@ class GaussianFilter:
     def longest_step_s(self) -> float:
         """A longer prediction is refused, s; infinity: none is."""
         return float(self._options["longest_step_s"])
+
+    @property
+    def components(self) -> int:
+        """How many Gaussians the belief may be made of; 1: no more than one."""
+        return self._components
+
+    @property
+    def headings(self) -> int:
+        """How many headings the start was made of; 1: the heading was known."""
+        return self._headings
+
+    @property
+    def convergence(self) -> Convergence:
+        """What the ranges say about where the craft is; only with ``components``."""
+        if self._components == 1:
+            raise AttributeError("convergence needs components; this filter has one")
+        return self._filter.convergence
+
+    @property
+    def mixture(self) -> Mixture:
+        """The Gaussians of the belief, whose moments are ``x`` and ``P``; copies."""
+        return Mixture(*self._filter.mixture)
 
     @property
     def policy(self) -> IntervalPolicy | None:
@@ -550,6 +607,8 @@ class GaussianFilter:
             columns["interval_s"] = None
         if self.late_s == 0:
             columns["too_late"] = None
+        for name in ("convergence", "mixture_size") if self._components == 1 else ():
+            columns[name] = None
         kept: dict[str, Any] = {
             key: None if column is None else column[:done] for key, column in columns.items()
         }
@@ -643,6 +702,8 @@ class GaussianFilter:
         states = len(self._process.state)
         _require_correlations(arrays["P"], states)
         _require_correlations(arrays["base"][states : states + states * states], states)
+        if self._components > 1:
+            self._require_mixture(arrays["mixture"])
         events = self._remembered(arrays.pop("event_models"), arrays.pop("event_sensor"))
         report = _saved_report(arrays)
         twin = self._filter.copy()
@@ -655,7 +716,8 @@ class GaussianFilter:
 
     def _saved_dtypes(self) -> dict[str, npt.DTypeLike]:
         """Give the arrays of a saved state."""
-        numbers = ("x", "P", "input", "policy", "recovery", "base", "events")
+        numbers = ["x", "P", "input", "policy", "recovery", "base", "events"]
+        numbers += ["mixture"] * (self._components > 1)
         report = (*(f"report_{name}" for name in _REPORT), "report_nis")
         whole = ("status", "event_sensor", "report_flags")
         return {
@@ -685,6 +747,14 @@ class GaussianFilter:
             if not number(low) <= value <= number(high):
                 raise ValueError(f"state is damaged: {name} is {value}, limits {low} and {high}")
 
+    def _require_mixture(self, saved: Floats) -> None:
+        """Refuse components with correlations beyond 1; the rest is the core's to say."""
+        states = len(self._process.state)
+        parts = saved[4:]
+        if parts.size % (1 + states + states * states) == 0:
+            for part in parts.reshape(-1, 1 + states + states * states):
+                _require_correlations(part[1 + states :], states)
+
     def _remembered(
         self, models: npt.NDArray[np.uint8], sensor: npt.NDArray[np.int64]
     ) -> list[_Sensor[Any] | None]:
@@ -707,6 +777,7 @@ class GaussianFilter:
         return model.core(len(self._process.state), self._dtype)
 
     def _description(self) -> dict[str, Any]:
+        several = {"components": self._components, "headings": self._headings}
         return {
             "dtype": self._dtype.name,
             "process": describe(self._process),
@@ -716,6 +787,7 @@ class GaussianFilter:
             "policy": describe(self._policy),
             **self._options,
             **self._parameters,
+            **({} if self._components == 1 else several),
         }
 
     def __getstate__(self) -> dict[str, Any]:
@@ -984,6 +1056,12 @@ def _as_sensors(sensors: Sensors, process: ProcessModel) -> dict[str, Measuremen
         as_instance(f"sensors[{name!r}]", model, MeasurementModel)
         model.check_process(process)
     return named
+
+
+def _makes_no_ring(model: MeasurementModel) -> bool:
+    """Whether a model is known not to be a range in the plane (one of the user's own may be)."""
+    known = isinstance(model, FunctionSensor) or type(model) in SENSORS.values()
+    return known and not isinstance(model, LeaderRange)
 
 
 def _named(sensors: Mapping[str, MeasurementModel]) -> str:

@@ -34,6 +34,14 @@ class Ekf(GaussianFilter):
     longest_step_s : float
         A prediction longer than this, s, is refused: a clock that jumped, or another unit of time;
         infinity: none is.
+    components : int
+        For a start that is not known, which a sigma of many times the distances says: how many
+        Gaussians the belief may be made of, 8..255; 16 to 32 are enough. The first range is then a
+        ring of them, and ``convergence`` says how far the ranges tell where the craft is. Use a
+        kernel that rejects. 1: one Gaussian, for a start that is known.
+    headings : int
+        For a heading, the third state, that is not known at all: how many the start is made of,
+        2..``components`` / 8. That of ``x0`` and its part of ``P0`` do not count then.
     residual : {"innovation", "post-fit"}
         What the kernel judges: the innovation by its own standard deviation, or what is left of it
         after the update by that of the sensor.

@@ -47,6 +47,28 @@ class Report:
     recovered: bool
 
 
+@dataclass(frozen=True, eq=False)
+class Mixture:
+    """The Gaussians that a belief is made of: where the craft may be, and how likely each is.
+
+    Attributes
+    ----------
+    weight : ndarray, shape (k,)
+        Their probabilities; the sum is 1.
+    x : ndarray, shape (k, n)
+        Their means.
+    P : ndarray, shape (k, n, n)
+        Their covariances.
+    """
+
+    weight: Floats
+    x: Floats
+    P: Floats
+
+    def __len__(self) -> int:
+        return len(self.weight)
+
+
 @dataclass(frozen=True, repr=False, eq=False)
 class RunResult(Result):
     """What ``run`` returns; row k of each column is the state of affairs after row k of the record.
@@ -85,6 +107,11 @@ class RunResult(Result):
     too_late : ndarray of bool, shape (T,)
         True where a measurement was older than the filter remembers, and was left out [filters with
         ``late_s``].
+    convergence : ndarray of uint8, shape (T,)
+        What the ranges said about where the craft is, an :class:`auvest.Convergence` [filters with
+        ``components``].
+    mixture_size : ndarray of uint8, shape (T,)
+        How many Gaussians the belief was made of [filters with ``components``].
     """
 
     x: Floats
@@ -100,3 +127,5 @@ class RunResult(Result):
     recovered: npt.NDArray[np.bool_]
     interval_s: Floats
     too_late: npt.NDArray[np.bool_]
+    convergence: npt.NDArray[np.uint8]
+    mixture_size: npt.NDArray[np.uint8]

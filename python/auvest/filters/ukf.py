@@ -26,6 +26,8 @@ class Ukf(GaussianFilter):
     ----------
     x0, P0, process, sensors, kernel, recovery, policy, late_s, longest_step_s, dtype
         As for :class:`auvest.Ekf`.
+    components, headings
+        As for :class:`auvest.Ekf`.
     alpha : float
         Spread of the sigma points, in 1e-8..1. Where a model has no closed form (see
         docs/models.md) it must not be small.

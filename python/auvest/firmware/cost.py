@@ -151,7 +151,7 @@ def measure(
         If a compiler does not take the header.
     ValueError, TypeError
         If an argument is wrong.
-    SketchError, PackageError, SimulatorError, FileNotFoundError
+    SketchError, SimulatorError, FileNotFoundError
         If a tool is missing; the message says what to install.
     BoardError
         If the program fails on the board.

@@ -1,48 +1,36 @@
-"""Assemble the Arduino library: an installable zip.
-
-    python -m auvest.firmware.package [--output build/firmware]
+"""Assemble the Arduino library: an installable zip. ``auvest library`` writes it.
 
 The library is ``firmware/library``, completed with what lives elsewhere or is generated:
 
 - ``src/auvest``: the headers;
-- ``src/Eigen``: the headers of Eigen that these include, as the compilers list them;
+- ``src/Eigen``: the headers of Eigen that these include, without those for vector instructions;
 - ``src/*``: the C++ standard headers of ``firmware/avr_std``. Arduino puts ``src`` on the include
   path of every board, so each of them gives way to the toolchain's own where there is one;
 - the names of types and of the values of ``Status``, which the IDE colours, from the headers;
 - the version and the licences.
 
-The same sources give the same bytes, whenever and wherever the zip is made.
+No compiler takes part, and the same sources give the same bytes, whenever and wherever the zip is
+made: from the source tree or from an installed package.
 """
 
 from __future__ import annotations
 
-import argparse
 import io
+import os
 import re
-import shlex
 import shutil
-import subprocess
-import sys
 import zipfile
 from importlib.metadata import version
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from auvest._headers import firmware_folder, include_folders
 
 NAME = "auvest"
 
-# What includes what differs between a chip and a host; the library serves both kinds.
-_COMPILERS = {
-    "avr-g++": ("gcc-avr avr-libc", ["-mmcu=atmega2560", "-std=gnu++11"]),
-    "g++": ("g++", ["-DARDUINO", "-std=gnu++17"]),
-}
+_INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*[<"]([^<>"]+)[>"]', re.MULTILINE)
 # A type of namespace auvest, which begins a line; what is for the library's own use.
 _TYPE = re.compile(r"^(?:class|struct|enum class|using) (\w+)(?![\w<;])", re.MULTILINE)
 _DETAIL = re.compile(r"namespace detail \{.*?\n\}  // namespace detail", re.DOTALL)
-
-
-class PackageError(RuntimeError):
-    """The library could not be assembled; the message says what to do."""
 
 
 def _holding(name: str, folders: list[Path]) -> Path:
@@ -50,26 +38,26 @@ def _holding(name: str, folders: list[Path]) -> Path:
     return next(folder for folder in folders if (folder / name).is_file())
 
 
-def eigen_headers() -> tuple[Path, list[Path]]:
-    """Return Eigen's include folder and, relative to it, the headers that auvest includes."""
-    folders = include_folders(sources_first=True)
-    eigen = _holding("Eigen/Core", folders)
-    umbrella = _holding("auvest/auvest.hpp", folders) / "auvest" / "auvest.hpp"
-    found = set()
-    for compiler, (packages, options) in _COMPILERS.items():
-        if shutil.which(compiler) is None:
-            raise PackageError(f"{compiler} is not installed: install {packages}")
-        command = [compiler, "-M", *options, *(f"-I{folder}" for folder in folders)]
-        if compiler == "avr-g++":
-            command.append(f"-I{firmware_folder() / 'avr_std'}")
-        done = subprocess.run([*command, str(umbrella)], capture_output=True, text=True)
-        if done.returncode != 0:
-            raise PackageError(f"{shlex.join([*command, str(umbrella)])} failed:\n{done.stderr}")
-        for word in shlex.split(done.stdout.replace("\\\n", " ")):
-            path = Path(word)
-            if path.is_relative_to(eigen / "Eigen"):
-                found.add(path.relative_to(eigen))
-    return eigen, sorted(found)
+def eigen_headers(eigen: Path) -> list[PurePosixPath]:
+    """Give the headers that Eigen/Core includes under some condition, relative to its folder.
+
+    Those for vector instructions are left out: chips have none.
+    """
+    found: set[PurePosixPath] = set()
+    left = [PurePosixPath("Eigen/Core")]
+    while left:
+        header = left.pop()
+        found.add(header)
+        for name in _INCLUDE.findall((eigen / header).read_text(encoding="utf-8")):
+            for folder in (header.parent, PurePosixPath()):
+                path = PurePosixPath(os.path.normpath(folder / name))
+                vectors = "arch" in path.parts and "Default" not in path.parts
+                if vectors or path.parts[0] != "Eigen" or not (eigen / path).is_file():
+                    continue
+                if path not in found:
+                    left.append(path)
+                break
+    return sorted(found)
 
 
 def contents() -> dict[str, bytes]:
@@ -86,9 +74,9 @@ def contents() -> dict[str, bytes]:
     headers = _holding("auvest/auvest.hpp", include_folders(sources_first=True))
     add(headers / "auvest", "src/auvest/")
     add(sources / "avr_std", "src/")
-    eigen, used = eigen_headers()
-    for header in used:
-        origins[f"src/{header.as_posix()}"] = eigen / header
+    eigen = _holding("Eigen/Core", include_folders(sources_first=True))
+    for header in eigen_headers(eigen):
+        origins[f"src/{header}"] = eigen / header
     tree = sources.parent
     origins["LICENSE"] = _holding("LICENSE", [sources, tree]) / "LICENSE"
 
@@ -114,8 +102,32 @@ def _keywords(headers: Path) -> str:
     return "\n".join(lines)
 
 
+def file_name() -> str:
+    """Give the name of the zip: that of the library and its version."""
+    return f"{NAME}-{version(NAME)}.zip"
+
+
+def archive() -> bytes:
+    """Return the zip.
+
+    Raises
+    ------
+    FileNotFoundError
+        If Eigen or the sources of the library are not here.
+    """
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as file:
+        for name, content in contents().items():
+            entry = zipfile.ZipInfo(f"{NAME}/{name}")  # of 1 January 1980
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.create_system = 3  # Unix, wherever it is made
+            entry.external_attr = 0o100644 << 16
+            file.writestr(entry, content)
+    return buffer.getvalue()
+
+
 def package(output: Path) -> Path:
-    """Write ``auvest-<version>.zip`` and, beside it, the unpacked folder; return the zip's path.
+    """Write the zip and, beside it, the unpacked folder; return the zip's path.
 
     Parameters
     ----------
@@ -124,50 +136,16 @@ def package(output: Path) -> Path:
 
     Raises
     ------
-    PackageError
-        If a compiler or Eigen is missing.
+    FileNotFoundError
+        If Eigen or the sources of the library are not here.
     """
-    files = contents()
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
-        for name, content in files.items():
-            entry = zipfile.ZipInfo(f"{NAME}/{name}")  # of 1 January 1980
-            entry.compress_type = zipfile.ZIP_DEFLATED
-            entry.external_attr = 0o100644 << 16
-            archive.writestr(entry, content)
-
+    content = archive()
     folder = output / NAME
     if folder.exists():
         shutil.rmtree(folder)
-    for name, content in files.items():
-        path = folder / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
-    archive_path = output / f"{NAME}-{version(NAME)}.zip"
-    archive_path.write_bytes(buffer.getvalue())
-    return archive_path
-
-
-def main() -> int:
-    """Run the command line."""
-    parser = argparse.ArgumentParser(
-        prog="auvest.firmware.package", description=__doc__.split("\n")[0]
-    )
-    parser.add_argument(
-        "--output",
-        type=Path,
-        default=Path("build/firmware"),
-        metavar="DIR",
-        help="where the zip and the unpacked folder go (default: %(default)s)",
-    )
-    arguments = parser.parse_args()
-    try:
-        print(package(arguments.output))
-    except PackageError as error:
-        print(f"auvest.firmware.package: {error}", file=sys.stderr)
-        return 1
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    output.mkdir(parents=True, exist_ok=True)
+    with zipfile.ZipFile(io.BytesIO(content)) as file:
+        file.extractall(output)
+    path = output / file_name()
+    path.write_bytes(content)
+    return path

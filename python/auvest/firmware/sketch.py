@@ -111,12 +111,12 @@ def compile_sketch(
     if not (sketch / f"{sketch.name}.ino").is_file():
         raise SketchError(f"{sketch}: a sketch is a folder with a file {sketch.name}.ino")
     if not library.is_file():
-        raise SketchError(
-            f"{library}: no such library; make it with python -m auvest.firmware.package"
-        )
+        raise SketchError(f"{library}: no such library; make it with auvest library")
     builder = shutil.which("arduino-builder")
     if builder is None:
         raise SketchError("arduino-builder is not installed: install arduino-builder")
+    if shutil.which("avr-g++") is None:
+        raise SketchError("avr-g++ is not installed: install gcc-avr avr-libc")
 
     output = output.resolve()
     sketchbook = output / "sketchbook"
@@ -195,7 +195,7 @@ def main() -> int:
     )
     parser.add_argument("sketch", type=Path, metavar="SKETCH_DIR", help="folder of the .ino file")
     parser.add_argument(
-        "--library", type=Path, required=True, metavar="ZIP", help="made by auvest.firmware.package"
+        "--library", type=Path, required=True, metavar="ZIP", help="made by auvest library"
     )
     parser.add_argument(
         "--output", type=Path, required=True, metavar="DIR", help="where the program goes"

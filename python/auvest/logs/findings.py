@@ -34,6 +34,10 @@ CAUSES: Mapping[str, tuple[str, Verdict]] = {
     "ignored_file": ("a file that no log has is not read", "sound"),
     "ignored_settings": ("settings that such a log has no use for", "sound"),
     "local_origin": ("coordinates are far from (0, 0); an origin is subtracted", "sound"),
+    # what the belief shows
+    "not_converged": ("the ranges do not say where the craft is", "not_trusted"),
+    "ambiguous": ("the ranges leave several places", "not_trusted"),
+    "settling": ("the ranges leave one place, not yet confirmed", "doubtful"),
     # what innovations show
     "not_used": ("measurements that no filter was given", "doubtful"),
     "lengths_apart": ("ranges and positions differ in unit or origin", "not_trusted"),

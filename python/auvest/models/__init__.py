@@ -9,8 +9,10 @@ from auvest.models.body_velocity import BodyVelocity
 from auvest.models.constant_acceleration import ConstantAcceleration
 from auvest.models.depth import Depth
 from auvest.models.functions import FunctionProcess, FunctionSensor, from_names
+from auvest.models.heading_speed import HeadingSpeed
 from auvest.models.leader_range import LeaderRange
 from auvest.models.odometry import Odometry
+from auvest.models.planar_hull import PlanarHull
 from auvest.models.position import Position
 from auvest.models.range_bearing import RangeBearing
 from auvest.models.range_bearing_elevation import RangeBearingElevation
@@ -24,6 +26,7 @@ PROCESSES: dict[str, type[ProcessModel]] = {
     for model in (
         ConstantAcceleration,
         Odometry,
+        PlanarHull,
         SpeedHeading,
         SpeedHeadingCurrent,
         WhiteAcceleration,
@@ -31,7 +34,15 @@ PROCESSES: dict[str, type[ProcessModel]] = {
 }
 SENSORS: dict[str, type[MeasurementModel]] = {
     model.__name__: model
-    for model in (BodyVelocity, Depth, LeaderRange, Position, RangeBearing, RangeBearingElevation)
+    for model in (
+        BodyVelocity,
+        Depth,
+        HeadingSpeed,
+        LeaderRange,
+        Position,
+        RangeBearing,
+        RangeBearingElevation,
+    )
 }
 
 
@@ -69,10 +80,12 @@ __all__ = [
     "Depth",
     "FunctionProcess",
     "FunctionSensor",
+    "HeadingSpeed",
     "LeaderRange",
     "MeasurementModel",
     "Model",
     "Odometry",
+    "PlanarHull",
     "Position",
     "ProcessModel",
     "RangeBearing",

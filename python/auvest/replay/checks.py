@@ -18,7 +18,7 @@ from auvest.logs.origin import local_origin, shifted
 from auvest.replay import diagnosis
 from auvest.replay.config import FilterName, Settings
 from auvest.replay.engine import replay_of
-from auvest.replay.health import Health, Residuals, findings, health
+from auvest.replay.health import Health, Residuals, findings, health, start_findings
 
 
 @dataclass(frozen=True)
@@ -106,10 +106,12 @@ def innovations(
 ) -> list[Finding]:
     """Say what a replay left, and why.
 
-    Where the files have shown already what is wrong, no other cause is looked for.
+    Where the files have shown already what is wrong, or the start was not found, no other cause is
+    looked for.
     """
-    shown = findings(residuals)
-    if not causes or worst(one.verdict for one in found) != "sound":
+    lost = start_findings(residuals)
+    shown = [*lost, *findings(residuals)]
+    if not causes or worst(one.verdict for one in [*found, *lost]) != "sound":
         return shown
     named = diagnosis.diagnose(log, settings, filter_name, gross=bool(shown))
     if named:  # it explains why one source has more of it than others

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Literal, TypeAlias, get_args, get_type_hints
 
-from auvest._fields import not_negative, number, positive
+from auvest._fields import integer, not_negative, number, positive
 from auvest._outputs import is_plain_file
 
 if sys.version_info >= (3, 11):
@@ -24,12 +24,18 @@ _PACKAGED = Path(__file__).parent / "configs"
 
 @dataclass(frozen=True, kw_only=True)
 class FilterSettings:
-    """The filter: ``kernel``, ``rejections`` and ``residual`` are those of robust-ekf."""
+    """The filter: ``kernel``, ``rejections`` and ``residual`` are those of robust-ekf.
+
+    ``components`` above 1 are for ranges from a start that is not known, ``headings`` above 1 for
+    one whose heading is not known either.
+    """
 
     kind: FilterName | None = None  # None: robust-ekf for ranges, ukf for fixes
     kernel: KernelName = "hampel"  # with the thresholds that are its defaults
     alpha: float = positive(1e-3)
     longest_step_s: float = positive(3600.0, infinite=True)
+    components: int = integer(1, 1, 255)  # 16 to 32 for a start that is not known
+    headings: int = integer(1, 1, 31)  # so many start headings, of 8 components each at least
 
 
 @dataclass(frozen=True, kw_only=True)

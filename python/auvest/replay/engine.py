@@ -280,13 +280,17 @@ class Localiser(Replay):
         time = np.insert(times, after, fused[:, 0])
         x: Floats = np.empty((0, 3))
         covariance: Floats = np.empty((0, 3, 3))
+        mixture = {name: np.empty(0, np.uint8) for name in tables.MIXTURE}
+        located = np.empty(0, bool)
         if len(time):
             motion = np.insert(np.column_stack([chord.real, chord.imag, turn]), after, 0.0, axis=0)
             z = np.insert(np.full(len(times), np.nan), after, fused[:, 2])
             place = np.insert(np.full((len(times), 3), np.nan), after, where, axis=0)
             dt = np.insert(np.diff(bounds), after, 0.0)
-            updates, x, covariance = self._run(z, dt, motion, place)
+            updates, x, covariance, mixture = self._run(z, dt, motion, place)
             _fill(columns, np.flatnonzero(used), updates)
+            measured = ~np.isnan(z)
+            located = _located(covariance[measured], z[measured], updates["sigma"])
 
         # The state after the last row of each time, behind that before this stretch.
         final = np.flatnonzero(np.diff(time, append=math.inf) > 0)
@@ -312,11 +316,17 @@ class Localiser(Replay):
         self._now, self._x, self._P = float(at[-1]), states[-1:], spreads[-1:]
         self._reckoned = reckoned[-1:]
         self._motion.forget(self._now)
+        estimates = _estimates(at[1:], states[1:], states[1:, 2], spreads[1:], reckoned[1:])
+        if self._filter.components > 1:
+            said, size = (mixture[name][final] for name in tables.MIXTURE)
+            named = {"convergence": tables.CONVERGENCES[said], "mixture_size": size}
+            estimates = {**estimates, **named}
         return Batch(
-            estimates=_estimates(at[1:], states[1:], states[1:, 2], spreads[1:], reckoned[1:]),
+            estimates=estimates,
             measurements=columns,
             errors=errors,
             ranges_m=ranges[:, 2],
+            located=located,
         )
 
     def _events(self, limit: float, measured: Rows) -> Rows:
@@ -337,15 +347,15 @@ class Localiser(Replay):
 
     def _run(
         self, z: Rows, dt: Rows, motion: Rows, place: Rows
-    ) -> tuple[dict[str, npt.NDArray[Any]], Floats, Floats]:
-        """Rows through the filter: what the updates reported, states and covariances.
+    ) -> tuple[dict[str, npt.NDArray[Any]], Floats, Floats, dict[str, npt.NDArray[Any]]]:
+        """Rows through the filter: updates, states, covariances, and what it says of its mixture.
 
         One call per stretch in which the leaders' positions are known equally well.
         """
         spread = np.where(np.isnan(z), -1.0, place[:, 2])
         spread = spread[np.maximum.accumulate(np.where(spread >= 0, np.arange(len(z)), 0))]
         cuts = np.flatnonzero(np.diff(spread)) + 1
-        results = []
+        results, sigmas = [], []
         for part in np.split(np.arange(len(z)), cuts):
             sensor = replace(self._sensor, sigma_leader_m=max(float(spread[part[-1]]), 0.0))
             result = self._filter.run(
@@ -356,10 +366,17 @@ class Localiser(Replay):
                 sensor=sensor,
             )
             results.append(result)
+            sigma = math.hypot(sensor.sigma_range_m, sensor.sigma_leader_m)
+            sigmas.append(np.full(int((~np.isnan(z[part])).sum()), sigma))
+        mixture = {}
+        if self._filter.components > 1:
+            for name in tables.MIXTURE:
+                mixture[name] = np.concatenate([getattr(result, name) for result in results])
         return (
-            updates_of(results),
+            {**updates_of(results), "sigma": np.concatenate(sigmas)},
             np.concatenate([result.x for result in results]),
             np.concatenate([result.P for result in results]),
+            mixture,
         )
 
 
@@ -373,6 +390,8 @@ class Tracker(Replay):
     _measured = "fixes.csv"
 
     def __init__(self, log: LogFolder, settings: Settings, filter_name: FilterName) -> None:
+        if settings.filter.components > 1 or settings.filter.headings > 1:
+            raise ValueError("[filter] components and headings are for logs of ranges")
         super().__init__(log, settings, filter_name)
         fixes = settings.fixes
         self._process = ConstantAcceleration(**vars(settings.process))
@@ -517,6 +536,8 @@ def _build(
     entry = registry.filter_named(name, registry.replayable())
     kind: type[GaussianFilter] = getattr(auvest, entry.cls)
     models["longest_step_s"] = settings.filter.longest_step_s
+    models["components"] = settings.filter.components
+    models["headings"] = settings.filter.headings
     if issubclass(kind, (RobustEkf, RobustUkf)):
         models["kernel"] = settings.filter.kernel
     if issubclass(kind, Ukf):
@@ -580,6 +601,19 @@ def _estimates(
         "dead_reckoned_x_m": unknown if reckoned is None else reckoned[:, 0],
         "dead_reckoned_y_m": unknown if reckoned is None else reckoned[:, 1],
     }
+
+
+def _located(covariance: Floats, ranges_m: Floats, sigmas_m: Floats) -> npt.NDArray[np.bool_]:
+    """Whether each belief is one for which the circle of its range is a line.
+
+    The larger variance of the position is below 3 sqrt(2) sigma z, as the filters with components
+    have it (docs/algorithms/unknown_start.md).
+    """
+    half = 0.5 * (covariance[:, 0, 0] - covariance[:, 1, 1])
+    larger = 0.5 * (covariance[:, 0, 0] + covariance[:, 1, 1]) + np.hypot(half, covariance[:, 0, 1])
+    bend = 3 * math.sqrt(2) * sigmas_m * np.maximum(ranges_m, sigmas_m)
+    located: npt.NDArray[np.bool_] = larger <= bend
+    return located
 
 
 def _nothing(columns: dict[str, npt.NDArray[Any]], ranges_m: Rows) -> Batch:

@@ -81,6 +81,7 @@ def rows(result: Result) -> list[tuple[str, str]]:
         ("time", f"{n['first_s']:.1f} to {n['last_s']:.1f} s"),
         ("measurements", f"{n['measurements']}"),
         *((outcome, f"{n[outcome.replace(' ', '_')]}") for outcome in tables.OUTCOMES[:4]),
+        ("start", _start(n)),
         ("recoveries from lock-out", f"{n['recovered']}"),
         ("taken as positions (near field)", f"{n['near_field']}"),
         ("late lines put in order", f"{sum(f['reordered'] for f in n['late'].values())}"),
@@ -95,6 +96,14 @@ def rows(result: Result) -> list[tuple[str, str]]:
         ("measurements beyond three sigma", _share(health.beyond_share)),
     ]
     return [(name, text) for name, text in made if text]
+
+
+def _start(numbers: dict[str, Any]) -> str:
+    if "convergence" not in numbers:
+        return ""
+    if numbers["settled_s"] is None:
+        return f"{numbers['convergence']} at the end, never settled"
+    return f"settled first at {numbers['settled_s']:.1f} s, {numbers['convergence']} at the end"
 
 
 def _metres(value: float | None) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
@@ -36,7 +37,8 @@ class Result:
     filter_name : str
         The filter.
     numbers : dict
-        The figures of the run, see :class:`auvest.replay.tally.Tally`, and ``late``.
+        The figures of the run, see :class:`auvest.replay.tally.Tally`, and ``late``; of a filter
+        with several components ``convergence``, at the end, and ``settled_s``, when first.
     estimates, measurements, errors, outliers : Samples
         At most a few thousand rows of each table, for figures; ``outliers`` are measurements with
         less than full weight.
@@ -149,6 +151,10 @@ def replay(
             interrupted = True
     numbers = tally.numbers()
     numbers["origin_m"] = None if origin is None else list(origin)
+    if residuals.convergence:
+        settled_s = residuals.settled_s
+        numbers["convergence"] = residuals.convergence
+        numbers["settled_s"] = None if math.isnan(settled_s) else settled_s
     numbers["late"] = {name: asdict(stream.late) for name, stream in engine.streams.items()}
     return Result(
         name=log.path.resolve().name,

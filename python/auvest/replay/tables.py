@@ -28,6 +28,11 @@ MEASUREMENTS = (
     "time_s", "source", "outcome", "innovation_0", "innovation_1", "sigma_0", "sigma_1",
     "near_field", "nis", "weight_0", "weight_1", "recovered", "held_out_error_m",
 )  # fmt: skip
+#: What is beside the estimates of a filter with several components, and by the number of
+#: auvest.Convergence.
+MIXTURE = ("convergence", "mixture_size")
+NOT_CONVERGED, AMBIGUOUS, SETTLING, SETTLED = "not converged", "ambiguous", "settling", "settled"
+CONVERGENCES = np.array([NOT_CONVERGED, AMBIGUOUS, SETTLING, SETTLED])
 ERRORS = (
     "time_s", "true_x_m", "true_y_m", "error_x_m", "error_y_m", "sigma_x_m", "sigma_y_m",
     "dead_reckoned_error_m",
@@ -38,13 +43,15 @@ ERRORS = (
 class Batch:
     """What a stretch of the log gave; each a mapping of the names above to columns.
 
-    ``ranges_m`` are the ranges of the measurements as the log has them.
+    ``ranges_m`` are the ranges of the measurements as the log has them, ``located`` says of those
+    that were used as ranges whether the belief behind each told where on its circle the craft is.
     """
 
     estimates: Columns
     measurements: Columns
     errors: Columns
     ranges_m: npt.NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    located: npt.NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, bool))
 
 
 def moved(batch: Batch, origin: tuple[float, float]) -> Batch:

@@ -59,6 +59,7 @@ def chip_mission(**options: Any) -> Mission:
         "usbl_noise_m",
         "usbl_noise_rad",
         "degrees_of_freedom",
+        "path",
         "arc_m",
         "switch_m",
         "end_m",
@@ -439,20 +440,22 @@ class ChipFlight:
     rows: list[Row] = field(default_factory=list)
     comments: list[str] = field(default_factory=list)
     damaged: int = 0
+    last_damage: str = ""
     awake_share: float = float("nan")
     stack_bytes: int = 0
     serial_overruns: int = 0
-    reader: Reader = field(default_factory=lambda: Reader("MISSION"))
+    reader: Reader = field(default_factory=Reader)
 
     def hear(self, line: str, time_s: float) -> list[tuple[float, str]]:
         """Take a line; what the vehicle answers."""
         answers = self.vehicle.hear(line, time_s)
         try:
             row = self.reader.read(line)
-        except LineError:
+        except LineError as error:
             self.damaged += 1
+            self.last_damage = str(error)
             return answers
-        if row is not None:
+        if isinstance(row, dict):
             self.rows.append(row)
         elif line.startswith("#"):
             self.comments.append(line)

@@ -17,6 +17,7 @@
 #include "auvest/models/constant_velocity.hpp"
 #include "auvest/models/coordinated_turn.hpp"
 #include "auvest/models/depth.hpp"
+#include "auvest/models/heading_speed.hpp"
 #include "auvest/models/leader_range.hpp"
 #include "auvest/models/linear.hpp"
 #include "auvest/models/odometry.hpp"
@@ -309,6 +310,7 @@ TEST_CASE("measurement models") {
   check_measurement(fix<double, 2, 2>(), 100);
   check_measurement(fix<double, 6, 3>(), 100);
   check_measurement(depth<double, 3>(), 100);
+  check_measurement(auvest::HeadingSpeed<double, 8>(), 1);
   check_measurement(log_at<double, 6, 2>(2.5), 10);
   check_measurement(log_at<double, 6, 3>(-0.7), 10);
   check_measurement(usbl<double>(3, -2, 5), 100);

@@ -53,11 +53,23 @@ struct RangeCircle {
   Scalar sigma;
 };
 
+/// Where the components are: in place.
 template <class Scalar, int N, int K>
-struct GaussianMixture {
+struct ComponentArrays {
   std::uint8_t size;  ///< n, 1..K
   Scalar weight[K];   ///< of the first n: positive, their sum is 1
   Belief<Scalar, N> component[K];
+
+  /// Makes room for so many, at most K.
+  void reserve(int) {}
+};
+
+/// `Components`: as ComponentArrays, of at most K.
+template <class Scalar, int N, int K, class Components = ComponentArrays<Scalar, N, K>>
+struct GaussianMixture : Components {
+  using Components::component;
+  using Components::size;
+  using Components::weight;
 
   /// One Gaussian.
   void assign(const Belief<Scalar, N>& belief) {

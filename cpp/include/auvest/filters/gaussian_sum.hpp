@@ -60,15 +60,16 @@ constexpr int default_components() {
 }
 
 /// What a mixture carries from range to range beside its components.
-template <class Scalar, int N, int K>
+template <class Scalar, int N, int K, class Components = ComponentArrays<Scalar, N, K>>
 struct GaussianSumState {
-  GaussianMixture<Scalar, N, K> mixture;  ///< its components count where there are several
-  std::uint8_t accepted = 0;              ///< ranges since it was not converged or ambiguous, to 6
-  std::uint8_t headings = 1;              ///< of which each is to have a ring of its own
-  Scalar bend = Scalar(0);  ///< 3 sqrt(2) sigma z of the last range: a wider variance bends
+  GaussianMixture<Scalar, N, K, Components> mixture;  ///< counts where there are several
+  std::uint8_t accepted = 0;  ///< ranges since it was not converged or ambiguous, to 6
+  std::uint8_t headings = 1;  ///< of which each is to have a ring of its own
+  Scalar bend = Scalar(0);    ///< 3 sqrt(2) sigma z of the last range: a wider variance bends
 };
 
-template <class Robust_, int K_ = default_components<typename Robust_::Scalar>()>
+template <class Robust_, int K_ = default_components<typename Robust_::Scalar>(),
+          class Components = ComponentArrays<typename Robust_::Scalar, Robust_::kStates, K_>>
 class GaussianSum : public Robust_ {
  public:
   using Base = Robust_;
@@ -82,8 +83,8 @@ class GaussianSum : public Robust_ {
   static constexpr int kMost = K_;
   static_assert(K_ >= 8 && K_ <= 255, "a ring of fewer components has gaps");
   static_assert(kStates >= 2, "the first two states are the position");
-  using Mixture = GaussianMixture<Scalar, kStates, kMost>;
-  using SumState = GaussianSumState<Scalar, kStates, kMost>;
+  using Mixture = GaussianMixture<Scalar, kStates, kMost, Components>;
+  using SumState = GaussianSumState<Scalar, kStates, kMost, Components>;
 
   struct Params {
     Scalar outlier_share = Scalar(0.1);  ///< of the ranges, in 0.001..0.5
@@ -94,6 +95,7 @@ class GaussianSum : public Robust_ {
   explicit GaussianSum(const Base& filter, const Params& params = Params())
       : Base(filter), params_(params), params_check_(check(params)) {
     state_.mixture.size = 1;
+    if (params.components > 1) state_.mixture.reserve(params.components);
   }
 
   /// Sets the belief. A sigma of many times the distances, also 1e6 m, says: unknown.
@@ -157,7 +159,7 @@ class GaussianSum : public Robust_ {
   /// Carries the belief dt >= 0 seconds forward.
   Status predict(Scalar dt) {
     if (size() == 1) return Base::predict(dt);
-    return predict_all(dt, Translates<Process::kTranslation>());
+    return this->process().translates() ? predict_together(dt) : predict_each(dt);
   }
 
   /// The same for a process that has an input, which is `input` during these dt seconds.
@@ -212,9 +214,7 @@ class GaussianSum : public Robust_ {
  private:
   static constexpr std::uint8_t kConfirmed = 6;
 
-  /// Choose between two forms (avr-gcc has no std::enable_if).
-  template <bool>
-  struct Translates {};
+  /// Chooses between two forms (avr-gcc has no std::enable_if).
   template <bool>
   struct IsCircle {};
 
@@ -277,7 +277,7 @@ class GaussianSum : public Robust_ {
   // ---- Prediction -------------------------------------------------------------------------------
 
   /// The displacement and its noise are the same for all: those of a belief of zeros.
-  Status predict_all(Scalar dt, Translates<true>) {
+  Status predict_together(Scalar dt) {
     const Status status = Base::predict(dt);  // of the moments
     if (status != Status::kOk) return status;
     BeliefType step;
@@ -295,7 +295,7 @@ class GaussianSum : public Robust_ {
   }
 
   /// Twice: the first time to see that none is refused.
-  Status predict_all(Scalar dt, Translates<false>) {
+  Status predict_each(Scalar dt) {
     BeliefType whole;
     math::copy(this->belief(), whole);
     for (int again = 0; again < 2; ++again) {

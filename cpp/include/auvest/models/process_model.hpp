@@ -39,6 +39,8 @@ struct ProcessModel {
   static constexpr bool kClosedForm = false;
   static constexpr bool kTranslation = false;
 
+  static constexpr bool translates() { return Derived::kTranslation; }
+
   /// f about x, with deviations by subtraction: f(x + e) - f(x) loses the digits that f(x) and
   /// f(x + e) share, so filters limit how small alpha may be (see SigmaPoints).
   struct NumericExpansion {

@@ -14,11 +14,12 @@
 // the sample is taken at once and counted as late; the prediction covers the time that really
 // passed.
 //
-// Text, 115200 baud: $MISSION,...*hh; a comment at the start names its columns. Now and then a
+// Text, 115200 baud: $MISSION,...*hhhhhhhh; a line at the start names its columns. Now and then a
 // comment says how much RAM was never used.
 #include <Arduino.h>
 #include <auvest.h>
 #include <auvest_board.h>
+#include <auvest_boot.h>
 #include <auvest_wake_timer.h>
 
 #include "config.h"
@@ -113,6 +114,7 @@ AUVEST_OUTLINE void report() {
 
 void setup() {
   Serial.begin(auvest_board::kBaud);
+  auvest_board::announce_boot();
   Telemetry::introduce();
   wake_timer::begin();
   while (!vehicle.started()) {

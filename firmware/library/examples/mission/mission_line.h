@@ -1,23 +1,21 @@
-// What the sketch and the vehicle say to each other: lines $...*hh over Serial
-// (auvest_text_line.h). This header is all that knows their format; auvest has it in
+// What the sketch and the vehicle say to each other: lines $body*hhhhhhhh over Serial
+// (auvest/board/line.hpp). This header is all that knows their bodies; auvest has them in
 // python/auvest/mission_line.py.
 //
 //     from the vehicle
-//     $START,x,y,heading*hh              where it is put into the water [m], [rad]: once, at first
-//     $COMPASS,sample,heading,pitch*hh   [rad]
-//     $GYRO,sample,q,r*hh                pitch rate, yaw rate [rad/s]
-//     $LOG,sample,u,v*hh                 through the water, ahead and to starboard [m/s]
-//     $DEPTH,sample,z*hh                 [m]
-//     $FIX,sample,range,bearing,delay*hh [m], [rad]; the sample that asked for it, and the seconds
-//                                        from then until what was measured was so
+//     START,x,y,heading              where it is put into the water [m], [rad]: once, at first
+//     COMPASS,sample,heading,pitch   [rad]
+//     GYRO,sample,q,r                pitch rate, yaw rate [rad/s]
+//     LOG,sample,u,v                 through the water, ahead and to starboard [m/s]
+//     DEPTH,sample,z                 [m]
+//     FIX,sample,range,bearing,delay [m], [rad]; the sample that asked for it, and the seconds
+//                                    from then until what was measured was so
 //     to the vehicle
-//     $READY*hh                          once a second until it is told where it starts
-//     $SENSE,sample,ping*hh              readings, please; ping is 1 where a fix is wanted too
-//     $STEER,sample,rudder,planes,propeller*hh   [rad], [rad], [rev/s]; floats by their bits
+//     READY                          once a second until it is told where it starts
+//     SENSE,sample,ping              readings, please; ping is 1 where a fix is wanted too
+//     STEER,sample,rudder,planes,propeller   [rad], [rad], [rev/s]; floats by their bits
 //
-// Numbers are digits with or without a sign and a point, nothing else: there is no way to write
-// NaN, infinity or an exponent. One becomes a float as digits / 10^decimals, two exact floats (up
-// to 2^24) divided once: the desk gets the same bits.
+// Numbers are as auvest/board/line.hpp says: no exponents, and the desk gets the same bits.
 //
 // A reading is believed if its line is whole and of this sample; a fix if it is of this sample or
 // an earlier one. All other lines are refused and counted.
@@ -27,7 +25,6 @@
 #include <auvest.h>
 #include <auvest_text_line.h>
 #include <auvest_wake_timer.h>
-#include <string.h>
 
 namespace wake_timer = auvest_board::wake_timer;
 
@@ -66,14 +63,14 @@ class MissionLine {
   void close() { readings_.heard = kAllHeard; }
 
   void announce() {
-    auvest_board::LineOut<16> line;
+    auvest_board::StoredLine<24> line;
     line.start("READY");
     line.finish();
     line.send();
   }
 
   void ask(bool ping) {
-    auvest_board::LineOut<24> line;
+    auvest_board::StoredLine<32> line;
     line.start("SENSE");
     line.field(sample_);
     line.field(static_cast<uint32_t>(ping));
@@ -82,7 +79,7 @@ class MissionLine {
   }
 
   void steer(const auvest::TorpedoCommand<float>& command) {
-    auvest_board::LineOut<56> line;
+    auvest_board::StoredLine<64> line;
     line.start("STEER");
     line.field(sample_);
     line.field(command.rudder_rad);
@@ -105,9 +102,9 @@ class MissionLine {
       }
       line.send_some();
       while (Serial.available() > 0) {
-        const auvest_board::LineIn::Result result = line_.take(static_cast<char>(Serial.read()));
-        if (result == auvest_board::LineIn::Result::kMore) continue;
-        if (result != auvest_board::LineIn::Result::kLine || !parse(line_.text())) ++refused_;
+        const auvest::LineIn::Result result = line_.take(static_cast<char>(Serial.read()));
+        if (result == auvest::LineIn::Result::kMore) continue;
+        if (result != auvest::LineIn::Result::kLine || !parse(line_.text())) ++refused_;
         if (done()) return true;
       }
       if (wake_timer::reached(limit)) return false;
@@ -128,32 +125,33 @@ class MissionLine {
 
  private:
   bool parse(const char* text) {
+    auvest::LineFields fields(text);
     float n[3];
     uint32_t sample;
-    if (is(text, "COMPASS")) {
-      if (!numbers(text, &sample, n, 2) || !hear(sample, auvest::kCompassHeard)) return false;
+    if (fields.named("COMPASS")) {
+      if (!numbers(fields, &sample, n, 2) || !hear(sample, auvest::kCompassHeard)) return false;
       readings_.heading_rad = n[0];
       readings_.pitch_rad = n[1];
-    } else if (is(text, "GYRO")) {
-      if (!numbers(text, &sample, n, 2) || !hear(sample, auvest::kGyroHeard)) return false;
+    } else if (fields.named("GYRO")) {
+      if (!numbers(fields, &sample, n, 2) || !hear(sample, auvest::kGyroHeard)) return false;
       readings_.pitch_rate_rad_s = n[0];
       readings_.yaw_rate_rad_s = n[1];
-    } else if (is(text, "LOG")) {
-      if (!numbers(text, &sample, n, 2) || !hear(sample, auvest::kLogHeard)) return false;
+    } else if (fields.named("LOG")) {
+      if (!numbers(fields, &sample, n, 2) || !hear(sample, auvest::kLogHeard)) return false;
       readings_.speed_m_s = n[0];
       readings_.sway_m_s = n[1];
-    } else if (is(text, "DEPTH")) {
-      if (!numbers(text, &sample, n, 1) || !hear(sample, auvest::kDepthHeard)) return false;
+    } else if (fields.named("DEPTH")) {
+      if (!numbers(fields, &sample, n, 1) || !hear(sample, auvest::kDepthHeard)) return false;
       readings_.depth_m = n[0];
-    } else if (is(text, "FIX")) {
-      if (!numbers(text, &sample, n, 3) || fixes_ == kFixes || sample > sample_) return false;
+    } else if (fields.named("FIX")) {
+      if (!numbers(fields, &sample, n, 3) || fixes_ == kFixes || sample > sample_) return false;
       MissionFix& fix = fix_[fixes_++];
       fix.z(0) = n[0];
       fix.z(1) = n[1];
       fix.sample = sample;
       fix.delay_s = n[2];
-    } else if (is(text, "START")) {
-      if (started_ || !numbers(text, nullptr, n, 3)) return false;
+    } else if (fields.named("START")) {
+      if (started_ || !numbers(fields, nullptr, n, 3)) return false;
       start_.x_m = n[0];
       start_.y_m = n[1];
       start_.heading_rad = n[2];
@@ -171,61 +169,13 @@ class MissionLine {
     return true;
   }
 
-  static bool is(const char* text, const char* name) {
-    const size_t size = strlen(name);
-    return strncmp(text, name, size) == 0 && text[size] == ',';
-  }
-
-  /// The fields behind the name: a sample number, if one is asked for, and so many numbers.
-  static bool numbers(const char* text, uint32_t* sample, float* n, uint8_t count) {
-    text = strchr(text, ',');
-    if (sample) {
-      Decimal number;
-      if (!take(text, number) || number.negative || number.decimals) return false;
-      *sample = number.digits;
-    }
+  /// A sample number, if one is asked for, and so many numbers; nothing else.
+  static bool numbers(auvest::LineFields& fields, uint32_t* sample, float* n, uint8_t count) {
+    if (sample && !fields.take(*sample)) return false;
     for (uint8_t i = 0; i < count; ++i) {
-      Decimal number;
-      if (!take(text, number)) return false;
-      const float size = static_cast<float>(number.digits) / power_of_ten(number.decimals);
-      n[i] = number.negative ? -size : size;
+      if (!fields.take(n[i])) return false;
     }
-    return *text == '\0';
-  }
-
-  struct Decimal {
-    uint32_t digits;
-    uint8_t decimals;
-    bool negative;
-  };
-
-  /// Takes ",-12.345": up to nine digits.
-  static bool take(const char*& text, Decimal& number) {
-    if (*text != ',') return false;
-    ++text;
-    number.digits = 0;
-    number.decimals = 0;
-    number.negative = *text == '-';
-    if (number.negative) ++text;
-    bool point = false;
-    uint8_t size = 0;
-    for (;; ++text) {
-      if (*text == '.' && !point) {
-        point = true;
-      } else if (*text >= '0' && *text <= '9') {
-        if (++size > 9) return false;
-        number.digits = 10 * number.digits + static_cast<uint8_t>(*text - '0');
-        if (point) ++number.decimals;
-      } else {
-        return size > 0;
-      }
-    }
-  }
-
-  static float power_of_ten(uint8_t n) {
-    float power = 1;
-    for (; n > 0; --n) power *= 10;  // exact up to 10^10
-    return power;
+    return fields.at_end();
   }
 
   uint32_t sample_ = 0;
@@ -235,5 +185,5 @@ class MissionLine {
   Readings readings_;
   MissionFix fix_[kFixes];
   uint8_t fixes_ = 0;
-  auvest_board::LineIn line_;
+  auvest::LineIn line_;
 };

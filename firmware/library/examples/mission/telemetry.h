@@ -25,18 +25,20 @@ struct Sample {
 
 class Telemetry {
   static constexpr size_t kNumbers = 11;
-  static constexpr size_t kCapacity = 104 + kNumbers * 9;
+  static constexpr size_t kCapacity = 112 + kNumbers * 9;
 
  public:
-  using Line = auvest_board::LineOut<kCapacity>;
+  using Line = auvest_board::StoredLine<kCapacity>;
 
-  /// Names the columns; to be sent once, before the first line.
+  /// Names the columns, those of whole numbers with #; to be sent once, before the first line.
   static void introduce() {
-    Serial.print(
-        F("# auvest mission: 8 hexadecimal digits are the bits of a float\r\n"
-          "# columns: sample,time_s,dt_s,heard,fixes,mode,leg,x_m,y_m,current_x_m_s,current_y_m_s,"
-          "P00_m2,P10_m2,P11_m2,heading_rad,cross_m,nis,"
-          "status,missed,implausible,refused,late,awake_us\r\n"));
+    auvest_board::LineOut line;
+    line.start("COLUMNS");
+    line.print(
+        F(",MISSION,sample#,time_s,dt_s,heard#,fixes#,mode#,leg#,x_m,y_m,current_x_m_s,"
+          "current_y_m_s,P00_m2,P10_m2,P11_m2,heading_rad,cross_m,nis,"
+          "status#,missed#,implausible#,refused#,late#,awake_us#"));
+    line.finish();
     Serial.flush();
   }
 

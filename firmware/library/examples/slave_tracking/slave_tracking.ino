@@ -6,10 +6,12 @@
 // particles are moved while sound and answer are on their way, then the echo is taken in. One line
 // of text, and sleep until the next second.
 //
-//     chip to log and compass   $ODO,17*hh
-//     log and compass to chip   $MOTION,17,5.08,0.5301*hh     sample, speed [m/s], heading [rad]
-//     chip to sonar             $PING,18*hh
-//     sonar to chip             $SONAR,18,301.2,-1.5640*hh    sample, range [m], bearing [rad]
+//     chip to log and compass   $ODO,17*...
+//     log and compass to chip   $MOTION,17,5.08,0.5301*...     sample, speed [m/s], heading [rad]
+//     chip to sonar             $PING,18*...
+//     sonar to chip             $SONAR,18,301.2,-1.5640*...    sample, range [m], bearing [rad]
+//
+// Behind * stand the eight digits of the line's CRC-32 (auvest/board/line.hpp).
 //
 // The bearing is the paper's: from the x axis, from the master to the slave.
 //
@@ -18,11 +20,12 @@
 // passed. A reading that does not come is replaced by the last one, an echo by nothing; both are
 // counted as missed.
 //
-// Text, 115200 baud: $SLAVE,...*hh; a comment at the start names its columns. The estimates are
+// Text, 115200 baud: $SLAVE,...*hhhhhhhh; a line at the start names its columns. The estimates are
 // computed after pings only. Now and then a comment says how much RAM was never used.
 #include <Arduino.h>
 #include <auvest.h>
 #include <auvest_board.h>
+#include <auvest_boot.h>
 #include <auvest_instruments.h>
 #include <auvest_wake_timer.h>
 
@@ -120,6 +123,7 @@ void setup() {
   Serial.begin(auvest_board::kBaud);
   pinMode(kTriggerPin, OUTPUT);
   digitalWrite(kTriggerPin, LOW);
+  auvest_board::announce_boot();
   Telemetry::introduce();
   sample.u(0) = kCruiseSpeed;
   sample.u(1) = kCruiseHeading;

@@ -1,4 +1,4 @@
-// One line of text per sample, and the comment that names its columns.
+// One line of text per sample, and the line that names its columns.
 //
 // auvest reads it back in python/auvest/telemetry.py.
 #pragma once
@@ -31,19 +31,21 @@ struct Sample {
 
 class Telemetry {
   static constexpr size_t kNumbers = 20;
-  static constexpr size_t kCapacity = 80 + kNumbers * (kExactText ? 9 : 10);
+  static constexpr size_t kCapacity = 88 + kNumbers * (kExactText ? 9 : 10);
 
  public:
-  using Line = auvest_board::LineOut<kCapacity>;
+  using Line = auvest_board::StoredLine<kCapacity>;
 
-  /// Names the columns; to be sent once, before the first line.
+  /// Names the columns, those of whole numbers with #; to be sent once, before the first line.
   static void introduce() {
-    Serial.print(
-        F("# auvest slave_tracking: 8 hexadecimal digits are the bits of a float\r\n"
-          "# columns: sample,time_s,dt_s,speed_m_s,heading_rad,range_m,bearing_rad,"
+    auvest_board::LineOut line;
+    line.start("COLUMNS");
+    line.print(
+        F(",SLAVE,sample#,time_s,dt_s,speed_m_s,heading_rad,range_m,bearing_rad,"
           "x_m,y_m,P00_m2,P10_m2,P11_m2,master_x_m,master_y_m,master_vx_m_s,master_vy_m_s,"
-          "master_P00_m2,master_P10_m2,master_P11_m2,n_eff,resamplings,"
-          "status,missed,refused,late,awake_us\r\n"));
+          "master_P00_m2,master_P10_m2,master_P11_m2,n_eff,resamplings#,"
+          "status#,missed#,refused#,late#,awake_us#"));
+    line.finish();
     Serial.flush();
   }
 

@@ -19,6 +19,9 @@ constexpr uint8_t kTriggerPin = 8;
 /// From the trigger to the last character of the answer, s. Sound needs 13 ms for 10 m and back.
 constexpr float kAnswerTimeout = 0.1f;
 
+/// A range beyond it cannot be: sound has not come back from there in time. The filter refuses it.
+constexpr float kLargestRange = 750 * kAnswerTimeout;
+
 /// Floats are sent as their bits, 8 hexadecimal digits. false: with 6 decimals, to be read in the
 /// Serial Monitor; small variances then round to nothing.
 constexpr bool kExactText = true;

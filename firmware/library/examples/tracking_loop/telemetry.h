@@ -1,4 +1,4 @@
-// One line of text per sample, and the comment that names its columns.
+// One line of text per sample, and the line that names its columns.
 //
 // auvest reads it back in python/auvest/telemetry.py.
 #pragma once
@@ -32,29 +32,31 @@ struct Sample {
 class Telemetry {
   static_assert(kCovarianceRows >= 1 && kCovarianceRows <= 6, "P has 1 to 6 rows to send");
   static constexpr size_t kNumbers = 13 + kCovarianceRows * (kCovarianceRows + 1) / 2;
-  static constexpr size_t kCapacity = 80 + kNumbers * (kExactText ? 9 : 14);
+  static constexpr size_t kCapacity = 88 + kNumbers * (kExactText ? 9 : 14);
 
  public:
-  using Line = auvest_board::LineOut<kCapacity>;
+  using Line = auvest_board::StoredLine<kCapacity>;
 
-  /// Names the columns; to be sent once, before the first line.
+  /// Names the columns, those of whole numbers with #; to be sent once, before the first line.
   static void introduce() {
-    Serial.print(
-        F("# auvest tracking_loop: 8 hexadecimal digits are the bits of a float\r\n"
-          "# columns: sample,time_s,dt_s,range_m,bearing_rad,desired_x_m,desired_y_m,"
+    auvest_board::LineOut line;
+    line.start("COLUMNS");
+    line.print(
+        F(",AUV,sample#,time_s,dt_s,range_m,bearing_rad,desired_x_m,desired_y_m,"
           "x_m,y_m,vx_m_s,vy_m_s,ax_m_s2,ay_m_s2"));
     for (int i = 0; i < kCovarianceRows; ++i) {
       for (int j = 0; j <= i; ++j) {
-        Serial.print(F(",P"));
-        Serial.print(i);
-        Serial.print(j);
-        Serial.print(F("_m2"));
+        line.print(F(",P"));
+        line.print(i);
+        line.print(j);
+        line.print(F("_m2"));
         const int per_seconds = i / 2 + j / 2;
-        if (per_seconds > 0) Serial.print(F("_s"));
-        if (per_seconds > 1) Serial.print(per_seconds);
+        if (per_seconds > 0) line.print(F("_s"));
+        if (per_seconds > 1) line.print(per_seconds);
       }
     }
-    Serial.print(F(",nis,interval_s,status,missed,refused,late,awake_us\r\n"));
+    line.print(F(",nis,interval_s,status#,missed#,refused#,late#,awake_us#"));
+    line.finish();
     Serial.flush();
   }
 

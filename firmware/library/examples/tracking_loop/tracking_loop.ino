@@ -12,7 +12,7 @@
 // Missing measurements. No answer in time, a wrong checksum, garbage, an answer to another sample:
 // the estimate is predicted only, and counted as missed.
 //
-// Text, 115200 baud. Each sample gives one line, $AUV,...*hh; a comment at the start names its
+// Text, 115200 baud. Each sample gives one line, $AUV,...*hhhhhhhh; a line at the start names its
 // columns. `auvest capture` makes a table and a figure of it; config.h has the other choices. A
 // line goes out at once if it is through before the next deadline, else behind the next request:
 // samples every 20 ms (T_min) keep their moments. Now and then a comment says how much RAM was
@@ -20,6 +20,7 @@
 #include <Arduino.h>
 #include <auvest.h>
 #include <auvest_board.h>
+#include <auvest_boot.h>
 #include <auvest_wake_timer.h>
 
 #include "config.h"
@@ -38,9 +39,15 @@ auvest::Ukf<Process> make_ukf() {
   return auvest::Ukf<Process>(Process(), points);
 }
 
+auvest::RangeBearing<float, 6>::Params sonar_params() {
+  auvest::RangeBearing<float, 6>::Params params;  // where the station is, how good the sonar is
+  params.largest_range_m = kLargestRange;
+  return params;
+}
+
 // All objects are global: what they take is known before the sketch runs.
 Filter filter(make_ukf());
-const auvest::RangeBearing<float, 6> model;  // where the station is, how good the sonar is
+const auvest::RangeBearing<float, 6> model(sonar_params());
 SerialSonar sonar(kTriggerPin);
 Telemetry telemetry;
 Sample sample;
@@ -80,6 +87,7 @@ void note(auvest::Status status) {
 void setup() {
   Serial.begin(auvest_board::kBaud);
   sonar.begin();
+  auvest_board::announce_boot();
   Telemetry::introduce();
   const auvest::Status status = start_filter();
   if (status != auvest::Status::kOk) {
