@@ -18,8 +18,6 @@
 // What the paper leaves open or misprints, and what is done here: docs/algorithms/slatf.md.
 #pragma once
 
-#include <limits>
-
 #include "auvest/math/counter_random.hpp"
 #include "auvest/math/linear_algebra.hpp"
 #include "auvest/particles/lanes.hpp"
@@ -153,15 +151,9 @@ class Slatf : public SlatfFrame<
     this->start(particles, Frame::noise_of_an_hour(motion_, master_));
     error_.restart();
 
-    // A variance so small that its inverse would not be finite is none.
-    Matrix<Scalar, kPose, kPose> P0 = pose.P;
-    for (int i = 0; i < kPose; ++i) {
-      if (P0(i, i) >= (std::numeric_limits<Scalar>::min)()) continue;
-      for (int k = 0; k < kPose; ++k) P0(i, k) = P0(k, i) = Scalar(0);
-    }
     Matrix<Scalar, kPose, kPose> root;
     Matrix<Scalar, 1, kPose> no_others;
-    math::factor_leading<math::DropLostPivots>(P0, root, no_others);
+    math::factor_leading<math::DropLostPivots>(pose.P, root, no_others);
     const math::CounterKey key(random);
     Schedule::for_each_group(set_, [&](int i) {
       Belief<Value, kPose> drawn;
