@@ -88,17 +88,19 @@ struct RuntimeProcess {
 /// pivots raised to what the format resolves. Those are of a covariance that rounding has left
 /// indefinite or with a variance of 0, in single precision by a measurement that is 1e7 times as
 /// precise as what it corrects. False where that is none either: not finite. No bit of a belief
-/// that restore() takes changes, nor of one so small that what is lost is subnormal.
+/// that restore() takes changes, nor of one so small that all that is lost is subnormal.
 template <class Filter>
 bool keep_belief(const typename Filter::BeliefType& before, typename Filter::BeliefType& belief) {
   using Scalar = typename Filter::Scalar;
   if (Filter::check_belief(belief) == Status::kOk) return true;
   typename Filter::Covariance raised = belief.P;
+  bool subnormal = true;
   for (int i = 0; i < Filter::kStates; ++i) {
     const Scalar floor = math::pivot_floor(before.P(i, i));
-    if (floor < (std::numeric_limits<Scalar>::min)()) return true;
+    subnormal = subnormal && floor < (std::numeric_limits<Scalar>::min)();
     raised(i, i) = math::larger(raised(i, i), floor);
   }
+  if (subnormal) return true;
   belief.P = raised;
   raise_pivots(belief.P);
   return Filter::check_belief(belief) == Status::kOk;

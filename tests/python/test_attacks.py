@@ -204,6 +204,19 @@ def test_a_measurement_finer_than_the_format_leaves_a_covariance(kind, options):
     assert f.P[0, 0] < 0.1**2 * 44**2
 
 
+def test_a_variance_beside_one_that_is_nothing_is_no_0():
+    f = auvest.Ckf(
+        [0.7, -0.2],
+        np.diag([1e-37, 1e37]),
+        process=auvest.SpeedHeading(),
+        sensors=auvest.Position(),
+        dtype="float32",
+    )
+    f.update([-1.7, 1.3])
+    assert (np.diagonal(f.P) > 0).all()
+    f.restore(f.save())
+
+
 @pytest.mark.parametrize("kind", [auvest.Slatf, auvest.SlatfJoint, auvest.EkfSlat])
 def test_slat_takes_no_start_that_leaves_no_room(kind):
     """Coordinates that are coarse, and variances whose sums or inverses are no numbers."""
