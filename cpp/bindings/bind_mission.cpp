@@ -167,6 +167,23 @@ py::dict source(const std::string& name, const std::string& track, double interv
   return result;
 }
 
+/// The poses that Dubins curves join, (8, 3), or the points of the spline, (29, 2).
+py::array_t<double> curve_plan(const std::string& path) {
+  using Curve = mission_detail::MissionCurve<double>;
+  const Curve curve{MissionScenario()};
+  const bool spline = kind_named<MissionLegs>(path, "path", kLegs) == MissionLegs::kSpline;
+  const py::ssize_t rows = spline ? Curve::kPoints : mission_detail::kMissionCorners;
+  const std::vector<py::ssize_t> shape{rows, spline ? 2 : 3};
+  py::array_t<double> plan(shape);
+  double* out = plan.mutable_data();
+  for (py::ssize_t i = 0; i < rows; ++i) {
+    *out++ = spline ? curve.points()[i].x_m : curve.poses()[i].x_m;
+    *out++ = spline ? curve.points()[i].y_m : curve.poses()[i].y_m;
+    if (!spline) *out++ = curve.poses()[i].heading_rad;
+  }
+  return plan;
+}
+
 }  // namespace
 
 void bind_mission(py::module_& m) {
@@ -178,6 +195,7 @@ void bind_mission(py::module_& m) {
     return result;
   });
   m.def("mission_sources", &source_names);
+  m.def("mission_curve_plan", &curve_plan, py::arg("path"));
   m.def("mission_source", &source, py::arg("name"), py::arg("track"), py::arg("interval_s"));
 }
 

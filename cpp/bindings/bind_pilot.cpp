@@ -72,17 +72,17 @@ class World {
     double heading = 0;
 
     explicit Begin(const MissionScenario& s) {
-      detail::MissionPath<double>(s).start(place, heading);
+      mission_detail::MissionPath<double>(s).start(place, heading);
     }
   };
 
-  detail::MissionWorld<SixDof> world(std::uint64_t seed, std::uint32_t run) const {
+  mission_detail::MissionWorld<SixDof> world(std::uint64_t seed, std::uint32_t run) const {
     return {scenario_, begin_.place, begin_.heading, seed, run};
   }
 
   MissionScenario scenario_;
   Begin begin_;
-  detail::MissionWorld<SixDof> world_;
+  mission_detail::MissionWorld<SixDof> world_;
 };
 
 // ---- The pilot with the bits of the chip

@@ -62,6 +62,7 @@ Kind kind_named(const py::dict& values, const char* name,
 
 // In the order of the enumerations.
 const std::array<const char*, 2> kTracks = {"lawnmower", "circle"};
+const std::array<const char*, 3> kLegs = {"waypoints", "dubins", "spline"};
 const std::array<const char*, 4> kEstimates = {"truth", "fixes", "ukf", "model-aided"};
 const std::array<const char*, 5> kLaws = {"adaptive", "crab", "line-of-sight", "integral",
                                           "vector-field"};
@@ -69,6 +70,7 @@ const std::array<const char*, 5> kLaws = {"adaptive", "crab", "line-of-sight", "
 inline MissionScenario to_scenario(const py::dict& values) {
   MissionScenario s;
   s.track = kind_named<MissionTrack>(values, "track", kTracks);
+  s.legs = kind_named<MissionLegs>(values, "path", kLegs);
   s.estimate = kind_named<MissionEstimate>(values, "estimate", kEstimates);
   s.guidance = kind_named<MissionGuidance>(values, "guidance", kLaws);
   visit_numbers(

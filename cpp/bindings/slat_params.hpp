@@ -38,7 +38,8 @@ AUVEST_VISIT(CoordinatedTurn, v("position_psd", p.noise.position);
              v("velocity_psd", p.noise.velocity); v("acceleration_psd", p.noise.acceleration);
              v("slow_m_s", p.slow_m_s);)
 AUVEST_VISIT(Sonar, v("sigma_range_m", p.sigma_range_m);
-             v("sigma_bearing_rad", p.sigma_bearing_rad);)
+             v("sigma_bearing_rad", p.sigma_bearing_rad); v("smallest_range_m", p.smallest_range_m);
+             v("largest_range_m", p.largest_range_m);)
 
 #undef AUVEST_VISIT
 

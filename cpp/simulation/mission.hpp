@@ -75,7 +75,7 @@ struct MissionStep {
   const MissionReadings& readings;
 };
 
-namespace detail {
+namespace mission_detail {
 
 /// A hull in these degrees of freedom, as the sensors see it. What is not free stays where it was.
 template <class Freedom>
@@ -444,8 +444,8 @@ MissionResult fly_with(const MissionScenario& s, std::uint64_t seed, std::uint32
 
     // The judgement of this step.
     const PathPoint<double> flown = path.judge(truth.pose);
-    const bool calm = s.track == MissionTrack::kCircle ? truth.time_s > s.settled_circle_s + 1e-9
-                                                       : flown.along_m >= s.settled_leg_m;
+    const bool calm =
+        path.smooth() ? truth.time_s > s.settled_circle_s + 1e-9 : flown.along_m >= s.settled_leg_m;
     const double ex = static_cast<double>(navigator.x) - truth.pose[0];
     const double ey = static_cast<double>(navigator.y) - truth.pose[1];
     const double command[3] = {static_cast<double>(out.rudder_rad),
@@ -478,7 +478,7 @@ MissionResult fly_with(const MissionScenario& s, std::uint64_t seed, std::uint32
   return result;
 }
 
-}  // namespace detail
+}  // namespace mission_detail
 
 /// Flies run number `run` of a scenario in these degrees of freedom and hands every step to
 /// `sink(step)`. The same seed and run give the same current, compass, noise and initial error
@@ -488,16 +488,17 @@ MissionResult fly_mission(const MissionScenario& scenario, std::uint64_t seed, s
                           Sink&& sink) {
   switch (scenario.estimate) {
     case MissionEstimate::kUkf:
-      return detail::fly_with<Scalar, Freedom, detail::UkfNavigator<Scalar>>(scenario, seed, run,
-                                                                             sink);
+      return mission_detail::fly_with<Scalar, Freedom, mission_detail::UkfNavigator<Scalar>>(
+          scenario, seed, run, sink);
     case MissionEstimate::kModelAided:
-      return detail::fly_with<Scalar, Freedom, detail::ModelAidedNavigator<Scalar>>(scenario, seed,
-                                                                                    run, sink);
+      return mission_detail::fly_with<Scalar, Freedom, mission_detail::ModelAidedNavigator<Scalar>>(
+          scenario, seed, run, sink);
     case MissionEstimate::kTruth:
     case MissionEstimate::kFixes:
       break;
   }
-  return detail::fly_with<Scalar, Freedom, detail::FixNavigator<Scalar>>(scenario, seed, run, sink);
+  return mission_detail::fly_with<Scalar, Freedom, mission_detail::FixNavigator<Scalar>>(
+      scenario, seed, run, sink);
 }
 
 /// The same without a look at the steps.

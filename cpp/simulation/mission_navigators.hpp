@@ -23,7 +23,7 @@
 #include "simulation/vehicle_sensors.hpp"
 
 namespace auvest {
-namespace detail {
+namespace mission_detail {
 
 /// v' P^-1 v by elimination, P given by its lower triangle.
 template <int N>
@@ -283,5 +283,5 @@ struct ModelAidedNavigator : FilterNavigator<Scalar, Ekf<SpeedHeadingCurrent<Sca
   }
 };
 
-}  // namespace detail
+}  // namespace mission_detail
 }  // namespace auvest

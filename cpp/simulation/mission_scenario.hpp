@@ -20,6 +20,13 @@ enum class MissionTrack : std::uint8_t {
   kCircle      ///< radius 40 m, clockwise, for 340 s
 };
 
+/// What leads from lane to lane of the lawnmower.
+enum class MissionLegs : std::uint8_t {
+  kWaypoints,  ///< corners, or arcs of `arc_m`
+  kDubins,     ///< the shortest curves that turn on `arc_m`
+  kSpline      ///< a spline through points of the lanes and of half circles between them
+};
+
 /// Where the position comes from that guidance runs on.
 enum class MissionEstimate : std::uint8_t {
   kTruth,      ///< the true state; no sensor has noise
@@ -40,6 +47,7 @@ enum class MissionGuidance : std::uint8_t {
 /// What a run is made of, beside seed and number.
 struct MissionScenario {
   MissionTrack track = MissionTrack::kLawnmower;
+  MissionLegs legs = MissionLegs::kWaypoints;
   MissionEstimate estimate = MissionEstimate::kTruth;
   MissionGuidance guidance = MissionGuidance::kAdaptive;
 
@@ -70,11 +78,11 @@ struct MissionScenario {
   double lookahead_m = 10;
   double switch_m = 12;
   double end_m = 2;  ///< the lawnmower is over this much before its last waypoint
-  double arc_m = 0;  ///< radius of arcs between its legs; 0: corners
+  double arc_m = 0;  ///< radius of the turns between its legs; 0: corners
   double circle_s = 340;
   double most_s = 1200;          ///< a lawnmower that is not over by then has failed
   double settled_leg_m = 50;     ///< "settled": from so far into a leg
-  double settled_circle_s = 60;  ///< and after so long on the circle
+  double settled_circle_s = 60;  ///< and after so long on the circle, and on curves
 };
 
 /// The rows of the closed-loop table.

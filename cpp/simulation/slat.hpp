@@ -105,10 +105,11 @@ struct SlatStep {
 /// `random` is the filter's: two filters with the same world meet the same noise. Stops at the
 /// first status that is not kOk and returns it.
 template <class Filter, class Sink>
-inline Status run_slat(Filter& filter, const Sonar<typename Filter::Scalar>& sonar,
+inline Status run_slat(Filter& filter, Sonar<typename Filter::Scalar> sonar,
                        const SlatScenario& scenario, math::Random& world, math::Random& random,
                        Sink&& sink) {
   using Scalar = typename Filter::Scalar;
+  sonar.params.lift_smallest();  // the noise may take the range below 0
   SlatVehicle slave = scenario.slave;
   SlatVehicle masters[SlatScenario::kMasters];
 

@@ -153,6 +153,22 @@ def far_from_origin(name: str, place: Floats, dtype: DType) -> str:
     )
 
 
+def impossible_range(name: str, range_m: float, limits: Any) -> str:
+    """Say that an instrument called ``name`` cannot have measured a range."""
+    known = ""
+    if hasattr(limits, "smallest_range_m") and hasattr(limits, "largest_range_m"):
+        known = f"; its ranges are {limits.smallest_range_m:g} to {limits.largest_range_m:g} m"
+    return f"{name} cannot measure a range of {range_m:g} m{known}; NaN is for no measurement"
+
+
+def require_range_limits(smallest_m: float, largest_m: float) -> None:
+    """Refuse an instrument that could measure no range."""
+    if not largest_m > smallest_m:
+        raise ValueError(
+            f"largest_range_m must be above smallest_range_m = {smallest_m}, not {largest_m}"
+        )
+
+
 def as_pair(name: str, value: object) -> tuple[float, float]:
     """Take two finite numbers, for example a position."""
     array = as_array(name, value, (2,), np.dtype(np.float64))

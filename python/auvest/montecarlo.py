@@ -94,7 +94,7 @@ def run(
     if store is not None and settings is None:
         raise TypeError("settings must be given with a store: they say whose results it holds")
 
-    kept = None if store is None else _Store(store, {"chunk": size, "settings": settings})
+    kept = None if store is None else Store(store, {"chunk": size, "settings": settings})
     parts: dict[int, Columns] = {}
     done = 0
 
@@ -126,9 +126,9 @@ def run(
         except BaseException as stop:
             pool.shutdown(cancel_futures=True)
             if isinstance(stop, KeyboardInterrupt):
-                raise Interrupted(_join(parts) if parts else None) from None
+                raise Interrupted(join(parts) if parts else None) from None
             raise
-    return _join(parts)
+    return join(parts)
 
 
 def discard(store: Path) -> None:
@@ -189,7 +189,8 @@ def _checked(columns: Mapping[str, npt.NDArray[Any]]) -> Columns:
     return arrays
 
 
-def _join(parts: dict[int, Columns]) -> Columns:
+def join(parts: Mapping[int, Mapping[str, npt.NDArray[Any]]]) -> Columns:
+    """Join chunks in the order of the runs; ``parts`` has each by its first run."""
     ordered = [parts[first] for first in sorted(parts)]
     return {name: np.concatenate([part[name] for part in ordered]) for name in ordered[0]}
 
@@ -210,12 +211,32 @@ def _is_label(path: Path) -> bool:
         return False
 
 
-class _Store:
-    """Finished chunks of one experiment, a file each that is there as a whole or not at all."""
+class Store:
+    """Finished chunks of one experiment, a file each that is there as a whole or not at all.
+
+    For runs that :func:`run` cannot do, because they talk to something; :func:`discard` removes it.
+
+    Parameters
+    ----------
+    folder : Path
+        As ``store`` of :func:`run`.
+    identity : mapping
+        What the results depend on, for JSON: the chunks of another experiment are removed.
+
+    Raises
+    ------
+    ValueError
+        If the folder holds what no run has written there.
+
+    Attributes
+    ----------
+    folder : Path
+        As given.
+    """
 
     def __init__(self, folder: Path, identity: Mapping[str, Any]) -> None:
         text = json.dumps(identity, sort_keys=True, default=str)
-        self._folder = folder
+        self.folder = folder
         name = hashlib.sha256(text.encode()).hexdigest()
         if folder.is_symlink():
             raise ValueError(f"store: {folder} is a link: name the folder itself")
@@ -235,13 +256,15 @@ class _Store:
             file.write(name)
 
     def _path(self, first: int, count: int) -> Path:
-        return self._folder / f"{first}-{first + count - 1}.npz"
+        return self.folder / f"{first}-{first + count - 1}.npz"
 
-    def write(self, first: int, count: int, columns: Columns) -> None:
+    def write(self, first: int, count: int, columns: Mapping[str, npt.NDArray[Any]]) -> None:
+        """Keep a chunk: the runs ``first .. first + count - 1``."""
         with new_file(self._path(first, count)) as file:
             np.savez(file, **columns)  # type: ignore[arg-type]
 
     def read(self, first: int, count: int) -> Columns | None:
+        """Give a chunk; None if it is not there or damaged."""
         path = self._path(first, count)
         if path.is_symlink() or not path.is_file():
             return None

@@ -21,7 +21,6 @@ KNOWN = (
     # Measurements that are 1e7 times as precise as what they correct.
     r"\w+: (variance of 0|P indefinite) after ok",
     r"\w+\.(restore|loads): its own state is refused",
-    r"Pilot_float32.start: changed by a refusal",
 )
 
 

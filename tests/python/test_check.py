@@ -6,6 +6,7 @@ import json
 import math
 import os
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from auvest.logs.findings import CAUSES, worst
 from auvest.logs.importers import IMPORTERS
 from auvest.logs.write import write_file
 from auvest.replay import Settings, find_settings, replay, settings_from
-from auvest.replay.checks import Checked, check
+from auvest.replay.checks import Checked, check, files
 from auvest.replay.health import RECOVERIES_NOT_TRUSTED, Residuals, health, truncated_moments
 from auvest.replay.health import findings as health_findings
 from auvest.replay.tables import Batch, blank_measurements
@@ -308,6 +309,94 @@ def test_a_source_of_which_most_is_thrown_away_stands_apart() -> None:
     more = Residuals()
     more.add(Batch(nothing, rows, nothing, np.full(40, 50.0)))
     assert health(more, []).untrusted_s == [(0.0, 5.0)]
+
+
+@pytest.mark.parametrize(
+    ("kind", "section", "key"), [("beacons", "fixes", "every_s"), ("tracking", "ranges", "sigma_m")]
+)
+def test_settings_for_the_other_kind_of_log_are_named(
+    kind: str, section: str, key: str, tmp_path: Path
+) -> None:
+    write(tmp_path, KINDS[kind].make(np.random.default_rng(5)))
+    settings = settings_from({section: {key: 7.0}})
+    notes = [one for one in files(LogFolder(tmp_path), settings) if one.cause == "ignored_settings"]
+    assert [one.verdict for one in notes] == ["sound"]
+    assert notes[0].message.startswith(f"[{section}] of the settings is of no use here")
+    assert files(LogFolder(tmp_path), Settings()) == []
+
+
+def times(file: str, column: str, factor: float) -> Callable[[Any], None]:
+    def spoil(files: Any) -> None:
+        files[file][column] = files[file][column] * factor
+
+    return spoil
+
+
+def plus(file: str, column: str, by: float) -> Callable[[Any], None]:
+    def spoil(files: Any) -> None:
+        files[file][column] = files[file][column] + by
+
+    return spoil
+
+
+def other_number(files: Any) -> None:
+    files["ranges.csv"]["source"] = np.where(files["ranges.csv"]["source"] == 2, 7.0, 1.0)
+
+
+def half_of_the_odometry(files: Any) -> None:
+    files["odometry.csv"] = {name: rows[:900] for name, rows in files["odometry.csv"].items()}
+
+
+def degrees_of_latitude(files: Any) -> None:
+    leaders = files["leaders.csv"]
+    leaders["x_m"], leaders["y_m"] = 5.9 + leaders["x_m"] / 81400, 43 + leaders["y_m"] / 111194
+
+
+#: What a new user does, what must be named, and the verdict. All were sound once, or named another.
+SLIPS = {
+    "ranges in cm": (times("ranges.csv", "range_m", 100), "lengths_apart", "not_trusted"),
+    "ranges in s": (times("ranges.csv", "range_m", 1 / 1500), "lengths_apart", "not_trusted"),
+    "sources of a map": (plus("leaders.csv", "x_m", 388096), "lengths_apart", "not_trusted"),
+    "degrees of latitude": (degrees_of_latitude, "lengths_apart", "doubtful"),
+    "increments in cm": (times("odometry.csv", "forward_m", 100), "millimetres", "not_trusted"),
+    "other numbers": (plus("ranges.csv", "source", 10), "not_used", "not_trusted"),
+    "one other number": (other_number, "not_used", "doubtful"),
+    "half of the odometry": (half_of_the_odometry, "not_used", "doubtful"),
+    "a late start": (plus("start.csv", "time_s", 300), "not_used", "doubtful"),
+    "a start elsewhere": (plus("start.csv", "x_m", 50), "start_off", "doubtful"),
+}
+
+
+@pytest.mark.parametrize("slip", SLIPS)
+def test_a_slip_that_leaves_small_innovations_is_named(slip: str, tmp_path: Path) -> None:
+    """A filter that has lost its track altogether, or was given nothing, meets no contradiction."""
+    spoil, cause, verdict = SLIPS[slip]
+    files = KINDS["leaders"].make(np.random.default_rng(5))
+    spoil(files)
+    write(tmp_path, files)
+    result = replay(LogFolder(tmp_path), KINDS["leaders"].settings, causes=False)
+    assert result.health.verdict == verdict
+    assert cause in [one.cause for one in result.findings]
+
+
+def test_a_filter_that_does_not_know_where_it_is_is_not_trusted() -> None:
+    """Everything fits a prediction that is a megametre wide."""
+    rows: dict[str, Any] = blank_measurements(40)
+    rows["time_s"], rows["nis"] = np.arange(40.0), np.full(40, 0.5)
+    rows["innovation_0"], rows["sigma_0"] = np.full(40, 0.7), np.full(40, 1.0)
+    nothing: dict[str, Any] = {}
+    for wide, verdicts in ((10, []), (11, ["not_trusted"])):
+        rows["sigma_0"][:wide] = 1e6
+        residuals = Residuals()
+        residuals.add(Batch(nothing, rows, nothing, np.full(40, 50.0)))
+        found = health_findings(residuals)
+        assert [one.verdict for one in found] == verdicts
+        assert health(residuals, found).untrusted_s == [(0.0, wide - 1.0)]
+        rows["near_field"][:] = True  # there it is a position that is wide
+        near = Residuals()
+        near.add(Batch(nothing, rows, nothing, np.full(40, 50.0)))
+        assert health_findings(near) == []
+        rows["near_field"][:] = False
 
 
 def test_command_shows_one_screen_and_refuses_what_is_no_folder(tmp_path: Path) -> None:

@@ -38,6 +38,7 @@ def test_parameters_that_differ_are_written_with_all_their_digits():
     ("arguments", "message"),
     [
         ([], "process must be named"),
+        (["none.hpp"], "file 'none.hpp' does not exist"),
         (["--process", "Odometry"], "sensor must be named"),
         (["--process", "Odometri"], "there is no model 'Odometri', but BodyVelocity, "),
         (["--process", "Position"], "process must be a process, but Position is a sensor"),

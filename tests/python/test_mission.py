@@ -71,6 +71,73 @@ def test_a_projection_flies_the_same_track():
     assert not np.array_equal(six.pose, three.pose)
 
 
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+@pytest.mark.parametrize(("path", "arc_m"), [("dubins", 20.0), ("dubins", 16.0), ("spline", 0.0)])
+def test_curves_are_flown_where_corners_are_missed(path, arc_m, dtype):
+    """State known, still water. Where the curvature jumps by 1/R the heading lags by two seconds of
+    U/R, and a look-ahead of 10 m makes 10 m times that.
+    """
+    plan = mission.source(
+        "truth_crab", "lawnmower", runs=2, path=path, arc_m=arc_m, dtype=dtype, current_m_s=0.0
+    )
+    curved = simulate(plan)
+    corners = simulate(dataclasses.replace(plan, path="waypoints", arc_m=0.0), record=False)
+    assert not curved.failed.any()
+    assert corners.all_rms_m.min() > 2
+    assert curved.all_rms_m.max() < 0.3 * corners.all_rms_m.min()
+    radius_m = arc_m or 10.8  # the tightest bend of the spline
+    assert np.nanmax(np.abs(curved.cross_m)) < 10 * 2 * 1.5 / radius_m
+    # What it is judged by is the distance from the curve.
+    points = mission.track_points(plan)
+    for pose, cross in zip(curved.pose[0, ::50, :2], curved.cross_m[0, ::50], strict=True):
+        if np.isfinite(cross):
+            nearest = np.hypot(*(points - pose).T).min()
+            assert nearest == pytest.approx(abs(cross), abs=0.6)  # points are 1 m apart
+    # After 60 s there is no corner to settle from.
+    flown = np.isfinite(curved.cross_m[0])
+    assert np.array_equal(curved.settled[0, flown] > 0, curved.time_s[flown] > 60 + 1e-9)
+
+
+def test_the_points_of_curves_lie_on_lanes_and_half_circles():
+    plan = Mission(path="dubins", arc_m=20.0)
+    points = mission.track_points(plan)
+    length = np.hypot(*np.diff(points, axis=0).T).sum()
+    assert length == pytest.approx(4 * 120 + 3 * np.pi * 20, abs=1)
+    on_lane = np.abs(points[:, 1:] - [20, 60, 100, 140]).min(axis=1) < 1e-6
+    beyond = (points[:, 0] > 140) | (points[:, 0] < 20)
+    x, y = points[~on_lane].T
+    centre_x = np.where(x > 80, 140, 20)
+    centre_y = 20 + 40 * np.round((y - 40) / 40) + 20
+    assert np.hypot(x - centre_x, y - centre_y) == pytest.approx(20, abs=1e-6)
+    assert beyond.sum() > 150
+    spline = mission.track_points(Mission(path="spline"))
+    inside = (spline[:, 0] > 40) & (spline[:, 0] < 120)
+    assert np.abs(spline[inside, 1:] - [20, 60, 100, 140]).min(axis=1).max() < 0.5
+    assert np.array_equal(mission.track_points(Mission()), mission.LAWNMOWER)
+    x, y, radius = mission.CIRCLE
+    circle = mission.track_points(Mission(track="circle"))
+    assert np.hypot(circle[:, 0] - x, circle[:, 1] - y) == pytest.approx(radius)
+
+
+def test_the_command_flies_curves(tmp_path):
+    base = ["simulate", "mission", "--runs", "2", "--no-figure", "--json", "--output"]
+    found = {}
+    for name, options in {
+        "corners": [],
+        "dubins": ["--path", "dubins"],
+        "wide": ["--path", "dubins", "--arc", "25"],
+        "spline": ["--path", "spline"],
+    }.items():
+        result = CliRunner().invoke(app, [*base, str(tmp_path / name), *options])
+        assert result.exit_code == 0, result.stderr
+        found[name] = json.loads(result.stdout)
+    assert found["dubins"]["settings"]["arc_m"] == 20
+    assert found["wide"]["settings"]["arc_m"] == 25
+    assert found["spline"]["settings"]["path"] == "spline"
+    corners = found.pop("corners")["results"]["all_rms_m"]
+    assert all(one["results"]["all_rms_m"] < corners / 3 for one in found.values())
+
+
 def test_float32_flies_close_to_float64():
     plans = [Mission(runs=1, track="circle", circle_s=60, dtype=d) for d in ("float64", "float32")]
     one, other = (simulate(plan) for plan in plans)
@@ -109,6 +176,10 @@ def test_a_policy_chooses_the_interval():
     ("options", "message"),
     [
         ({"track": "zigzag"}, "track must be 'lawnmower' or 'circle'"),
+        ({"path": "bezier"}, "path must be 'waypoints', 'dubins' or 'spline'"),
+        ({"path": "dubins"}, "path 'dubins' needs arc_m"),
+        ({"path": "spline", "arc_m": 20.0}, "arc_m does nothing with path 'spline'"),
+        ({"path": "spline", "track": "circle"}, "path 'spline' is for the lawnmower"),
         ({"estimate": "ukf"}, "guidance 'crab' needs an estimate of the current"),
         ({"current_m_s": -0.1}, "current_m_s must not be negative"),
         ({"current_m_s": math.nan}, "current_m_s must be"),

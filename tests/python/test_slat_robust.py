@@ -66,6 +66,71 @@ def test_an_outage_that_is_refused_has_not_begun():
 
 
 @pytest.mark.parametrize("name", HEARING)
+def test_a_range_that_no_sonar_measures_is_refused_by_name(name):
+    """-1 and 9999 are codes for "no echo" and say nothing of where the slave is."""
+    one = FILTERS[name](sonar=auvest.Sonar(largest_range_m=2000))
+    one.add_master(*MASTER)
+    before = one.save()
+    for call in (
+        lambda z: one.update(z),
+        lambda z: one.update(np.array([z])),
+        lambda z: one.step(1.0, [1, 0], z),
+    ):
+        for range_m in (-1, 9999):
+            with pytest.raises(
+                auvest.FilterError, match=f"measure a range of {range_m} m; its"
+            ) as e:
+                call([range_m, -1.5])
+            assert e.value.status == one.status == Status.impossible_range
+            assert one.save() == before
+    record = {"z": [[300, -1.5], [np.nan, np.nan], [-1, -1.5]], "z_time_s": [1, 2, 3]}
+    with pytest.raises(
+        auvest.FilterError, match="row 2: Sonar cannot measure a range of -1 m"
+    ) as e:
+        one.run(np.arange(5.0), np.zeros((4, 2)), **record)
+    assert len(e.value.partial) == 2
+    one.update([-1, -1.5], sonar=auvest.Sonar(smallest_range_m=-3))  # noise that is not cut off
+    with pytest.raises(ValueError, match="largest_range_m must be above smallest_range_m"):
+        auvest.Sonar(smallest_range_m=5, largest_range_m=5)
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_coordinates_of_a_map_are_refused_where_a_slave_would_stand_still(name):
+    """Near a northing of 4,000,000 m floats are 0.25 m apart."""
+    motion = auvest.CompassMotion(sigma_speed_m_s=0.05)
+    northing = [3948996.0, 388096.0]
+    one = FILTERS[name](dtype="float32", motion=motion)
+    make = type(one)
+    for sigma_m in (0.1, 30.0):  # 30 m: motion is rounded away all the same
+        with pytest.raises(
+            ValueError, match=r"x0 = \(3948996, 388096\) .* origin, such as \(3950000"
+        ):
+            make(northing, np.eye(2) * sigma_m**2, dtype="float32", motion=motion)
+    f64 = make(northing, np.eye(2), motion=motion)
+    f64.predict(100.0, [0.5, 0])
+    assert f64.x[0] - northing[0] == pytest.approx(50, abs=10)
+    outage = Outage(one)
+    with pytest.raises(ValueError, match=r"x = .* is too far from the origin"):
+        outage.share(northing, np.eye(2))
+    assert outage.communication == "never"
+    if name in HEARING:
+        with pytest.raises(ValueError, match=r"x = .* is too far from the origin"):
+            one.add_master([*northing, 0, 0, 0, 0], np.eye(6) * 0.01)
+        with pytest.raises(ValueError, match=r"masters\[0\]\[0\] = .* is too far from the origin"):
+            outage.share(START, CERTAIN, [([*northing, 0, 0, 0, 0], np.eye(6) * 0.01)])
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_a_slave_that_drifts_far_from_its_origin_says_so(name):
+    motion = auvest.CompassMotion(sigma_speed_m_s=1e-7, sigma_heading_rad=0)
+    one = FILTERS[name](dtype="float32", motion=motion)
+    with pytest.raises(auvest.FilterError, match=r"x = .* is too far from the origin") as e:
+        one.run(np.arange(101) * 100.0, np.tile([5.0, 0], (100, 1)))
+    assert e.value.status == one.status == Status.far_from_origin
+    assert 4096 < one.x[0] < 20000
+
+
+@pytest.mark.parametrize("name", HEARING)
 def test_a_lost_master_is_found_again_and_it_is_said(name):
     one = FILTERS[name]()
     one.add_master(*MASTER)

@@ -21,6 +21,7 @@ from auvest._core import PilotMode, StatusError
 from auvest.cli import app
 from auvest.simulation import mission, vehicle_in_the_loop
 from auvest.simulation.vehicle_in_the_loop import (
+    ChipFlight,
     ChipTwin,
     Vehicle,
     VehicleError,
@@ -306,6 +307,72 @@ def test_options_that_do_not_go_together(arguments: list[str], message: str) -> 
     result = CliRunner().invoke(app, ["mission", *arguments])
     assert result.exit_code == 2
     assert message in " ".join(result.stderr.replace("│", " ").split())
+
+
+def test_runs_that_are_flown_are_not_flown_again(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """A board fails in run 1 of 3: the same command flies 1 and 2, and reports as of one go."""
+    flown: list[int] = []
+    failing = {1}
+
+    def fly(_elf: Path, chip: ChipFlight, *, samples: int, progress: Callable[[], None]) -> None:
+        run = chip.vehicle.run
+        flown.append(run)
+        chip.hear(telemetry.frame("READY"), 0.0)
+        chip.hear("# columns: sample,time_s,mode,awake_us,refused,missed,implausible,late", 0.0)
+        for k in range(1, samples + 1):
+            chip.hear(telemetry.frame(f"SENSE,{k},{int(k % 5 == 0)}"), 0.1 * k)
+            chip.hear(telemetry.frame(f"MISSION,{k},{k / 10},1,{900 * run},{run},0,0,2"), 0.1 * k)
+            progress()
+            if run in failing and k == 20:
+                raise VehicleError("the board has begun anew")
+        chip.vehicle.finish()
+        chip.awake_share, chip.stack_bytes = 0.1 + 0.01 * run, 1000 + run
+
+    monkeypatch.setattr("auvest.commands.mission.fly_simulated", fly)
+    sketch = tmp_path / "sketch.elf"
+    sketch.write_bytes(b"one")
+
+    def call(name: str, seed: int = 1) -> tuple[int, str, dict]:
+        output = ["--output", str(tmp_path / name), "--workers", "1", "--no-figure", "--json"]
+        flight = ["--runs", "3", "--duration", "6", "--seed", str(seed)]
+        result = CliRunner().invoke(app, ["mission", "--simulator", str(sketch), *flight, *output])
+
+        return result.exit_code, result.stderr, json.loads(result.stdout)["results"]
+
+    code, error, values = call("a")
+    assert (code, flown) == (1, [0, 1])
+    assert "begun anew; 1 of 3 runs are done and kept; the same command goes on" in error
+    assert (values["runs"], values["samples"]) == (2, 60 + 19)  # the sample that failed is not over
+    failing.clear()
+    code, error, resumed = call("a")
+    assert (code, flown) == (0, [0, 1, 1, 2]), error
+    assert not (tmp_path / "a.runs").exists()
+    flown.clear()
+    whole = call("b")[2]
+    assert flown == [0, 1, 2]
+    assert resumed == whole
+    assert whole["late"] == 6
+    assert whole["lines_refused"] == 0 + 1 + 2
+    assert whole["stack_bytes"] == 1002
+    assert whole["awake_share_simulated"] == pytest.approx(0.11)
+    assert whole["awake_share_by_board"] == pytest.approx((0 + 900 + 1800) * 1e-6 * 59 / (3 * 5.9))
+    runs = (tmp_path / "a" / "runs.csv").read_text()
+    assert runs == (tmp_path / "b" / "runs.csv").read_text()
+    assert (tmp_path / "a" / "samples.csv").read_text() == (
+        tmp_path / "b" / "samples.csv"
+    ).read_text()
+
+    for changed in ("seed", "sketch"):  # of another experiment nothing is taken over
+        failing.add(1)
+        call("c")
+        failing.clear()
+        flown.clear()
+        if changed == "sketch":
+            sketch.write_bytes(b"two")
+        call("c", seed=2 if changed == "seed" else 1)
+        assert flown == [0, 1, 2], changed
 
 
 def test_the_modes_have_the_numbers_of_the_line() -> None:

@@ -46,7 +46,12 @@ def command(
     header: Annotated[
         Path | None,
         typer.Argument(
-            metavar="HEADER", help="Header with models of your own.", show_default=False
+            metavar="HEADER",
+            help="Header with models of your own.",
+            exists=True,
+            dir_okay=False,
+            readable=True,
+            show_default=False,
         ),
     ] = None,
     filter_name: Annotated[

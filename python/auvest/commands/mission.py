@@ -4,7 +4,8 @@ The sketch runs on an Arduino at --port, or on a simulated one with --simulator.
 sensors are here: the board reads compass, gyro, log, depth and fixes over its serial line, and its
 commands move the hull. Each run is set beside the same run without a chip ('auvest simulate
 mission' with the same seed), and every command of the chip beside that of its own pilot on the
-desk.
+desk. A run takes about a minute of a processor: runs that are flown are kept beside --output until
+all are, and the same command goes on from there.
 
 Examples
 --------
@@ -19,6 +20,7 @@ Examples
 
 from __future__ import annotations
 
+import hashlib
 import math
 import os
 import time
@@ -32,6 +34,7 @@ import numpy as np
 import typer
 from rich.table import Table
 
+from auvest import montecarlo
 from auvest.board import BoardError
 from auvest.commands import options
 from auvest.commands.console import Terminal, table
@@ -39,6 +42,7 @@ from auvest.commands.exit_codes import ExitCode
 from auvest.commands.options import option, refuse_given
 from auvest.commands.session import Floats, Session
 from auvest.commands.simulate_mission import COMPASS_BIAS_DEG, mean_and_error
+from auvest.commands.version import version
 from auvest.simulation import mission
 from auvest.simulation.mission import Mission
 from auvest.simulation.vehicle_in_the_loop import (
@@ -107,41 +111,73 @@ def command(
     settings = {"source": source, "duration_s": duration, **mission.settings(plan)}
     session = Session(terminal, output, "mission", settings, force=force)
     samples = None if duration is None else max(1, round(duration / PERIOD_S))
-    flights = [ChipFlight(Vehicle(plan, run)) for run in range(runs)]
+    kept = None
+    if simulator is not None:
+        store = output.with_name(f"{output.name}.runs")
+        with terminal.writing(store), terminal.usage_errors():
+            kept = montecarlo.Store(store, _identity(settings, simulator))
+    known = {run: old for run in range(runs) if kept and (old := kept.read(run, 1)) is not None}
+    flights = [ChipFlight(Vehicle(plan, run)) for run in range(runs) if run not in known]
     expected = samples or round(mission.simulate(plan, record=False).duration_s.mean() / PERIOD_S)
+    before = sum(int(old["samples"][0]) for old in known.values())
     with terminal.progress("samples") as progress:
 
         def flown() -> None:
-            progress(sum(flight.vehicle.twin.sample for flight in flights), runs * expected)
+            done = before + sum(flight.vehicle.twin.sample for flight in flights)
+            progress(done, before + len(flights) * expected)
 
         try:
-            if simulator is not None:
-                _fly_all(simulator, flights, samples, workers, flown)
+            if simulator is not None and kept is not None:
+
+                def keep(chip: ChipFlight) -> None:
+                    kept.write(chip.vehicle.run, 1, outcome(plan, chip))
+
+                _fly_all(simulator, flights, samples, workers, flown, keep)
             elif port is not None:
                 _fly_port(port, baud, flights[0], samples, flown)
         except KeyboardInterrupt:
             session.interrupted = True
         except (BoardError, VehicleError, _ConnectionLost, FileNotFoundError, ValueError) as error:
             session.trouble = str(error)  # ValueError: what was given as sketch is none
-    flights = [flight for flight in flights if flight.vehicle.flight.pose]
-    if not flights:
+    steered = [chip for chip in flights if chip.vehicle.flight.pose]
+    outcomes = known | {chip.vehicle.run: outcome(plan, chip) for chip in steered}
+    if not outcomes:
         why = session.trouble or "interrupted"
         code = ExitCode.INTERRUPTED if session.interrupted else ExitCode.FAILED
         terminal.fail(f"the chip has not steered: {why}", code)
 
-    beside = compare(plan, flights)
-    values = measures(flights, beside)
-    session.write_csv("samples", _samples(flights[0]))
-    session.write_csv("runs", beside)
+    first = outcomes[min(outcomes)]
+    columns = montecarlo.join(
+        {
+            run: {name: values for name, values in one.items() if values.ndim == 1}
+            for run, one in outcomes.items()
+        }
+    )
+    values = measures(columns)
+    session.write_csv("samples", _samples(first))
+    session.write_csv("runs", _each_run(columns))
     if not no_figure:
-        session.draw(_figure, flights[0], source)
+        session.draw(_figure, first, source)
     session.report(values, _table(values, source))
-    if len(flights) > 1:
-        terminal.result(_runs_table(beside))
-    lost = f"{session.trouble}; the samples until then are kept" if session.trouble else ""
+    if len(outcomes) > 1:
+        terminal.result(_runs_table(columns))
+    rest = "the samples until then are kept"
+    if kept is not None and (session.interrupted or session.trouble):
+        done = sum(kept.read(run, 1) is not None for run in range(runs))
+        rest = f"{done} of {runs} runs are done and kept; the same command goes on from there"
+    elif kept is not None:
+        montecarlo.discard(kept.folder)
+    lost = f"{session.trouble}; {rest}" if session.trouble else ""
     differing = values["differing_commands"]
     wrong = f"{differing} commands of the chip are not those of its pilot here" if differing else ""
-    session.end("the samples until then are kept", lost, wrong)
+    session.end(rest, lost, wrong)
+
+
+def _identity(settings: dict[str, Any], sketch: Path) -> dict[str, Any]:
+    """Say what a run depends on: the sketch, not where it lies; not the number of runs."""
+    kept = {name: value for name, value in settings.items() if name not in ("source", "runs")}
+    digest = hashlib.sha256(sketch.read_bytes()).hexdigest()
+    return {**kept, "sketch": digest, "version": version()}
 
 
 def _fly_all(
@@ -150,8 +186,9 @@ def _fly_all(
     samples: int | None,
     workers: int | None,
     flown: Callable[[], None],
+    keep: Callable[[ChipFlight], None],
 ) -> None:
-    """Fly all runs; the first failure, and Ctrl-C, ends those that are under way."""
+    """Fly all runs, and keep each; the first failure, and Ctrl-C, ends those under way."""
     ended = Event()
 
     def go_on() -> None:
@@ -160,8 +197,14 @@ def _fly_all(
             raise _Ended
 
     def fly(chip: ChipFlight) -> None:
-        if not ended.is_set():
+        if ended.is_set():
+            return
+        try:
             fly_simulated(elf, chip, samples=samples, progress=go_on)
+        except BaseException:
+            ended.set()  # here, before this thread takes the next run
+            raise
+        keep(chip)
 
     with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
         futures = [pool.submit(fly, chip) for chip in flights]
@@ -212,95 +255,130 @@ def _fly_port(
         chip.vehicle.finish()
 
 
-def compare(plan: Mission, flights: list[ChipFlight]) -> dict[str, Floats]:
-    """Set each run beside the same run on the desk: cross-track errors and what the line does.
+#: Columns of an outcome that runs.csv has.
+_EACH_RUN = (
+    "run",
+    "settled_rms_m",
+    "desk_settled_rms_m",
+    "difference_m",
+    "by_rounding_m",
+    "by_delay_m",
+    "all_rms_m",
+)
+_SAMPLES = (
+    "sample",
+    "north_m",
+    "east_m",
+    "depth_m",
+    "estimate_north_m",
+    "estimate_east_m",
+    "leg",
+    "along_m",
+    "cross_m",
+    "rudder_rad",
+    "stern_planes_rad",
+    "propeller_rev_s",
+)
 
-    Runs that were not flown to the end are compared as far as they went.
+
+def outcome(plan: Mission, chip: ChipFlight) -> montecarlo.Columns:
+    """Set a run beside the same run on the desk, and count what came of it: arrays with one row.
+
+    A run that was not flown to the end is compared as far as it went. ``track`` has its samples.
     """
-    rows: list[tuple[float, ...]] = []
-    for chip in flights:
-        run, flown = chip.vehicle.run, chip.vehicle.flight
-        count = len(flown.pose)
-        desk, rounded, delayed = (
-            fly_on_desk(plan, run, rounded=rounded, delay_s=delay_s).settled_rms_m(count=count)
-            for rounded, delay_s in ((False, 0.0), (True, 0.0), (False, DELAY_S))
-        )
-        settled = flown.settled_rms_m()
-        rows.append(
-            (run, settled, desk, settled - desk, rounded - desk, delayed - desk, flown.all_rms_m)
-        )
-    names = (
-        "run",
-        "settled_rms_m",
-        "desk_settled_rms_m",
-        "difference_m",
-        "by_rounding_m",
-        "by_delay_m",
-        "all_rms_m",
+    vehicle, flown = chip.vehicle, chip.vehicle.flight
+    count = len(flown.pose)
+    desk, rounded, delayed = (
+        fly_on_desk(plan, vehicle.run, rounded=rounded, delay_s=delay_s).settled_rms_m(count=count)
+        for rounded, delay_s in ((False, 0.0), (True, 0.0), (False, DELAY_S))
     )
-    return dict(zip(names, np.array(rows, float).T, strict=True))
+    settled = flown.settled_rms_m()
+    last = chip.rows[-1] if chip.rows else {}
+    counts = {
+        "run": vehicle.run,
+        "finished": int(flown.finished),
+        "samples": vehicle.twin.sample,
+        "commands": len(vehicle.delays_s),
+        "differing_commands": vehicle.differing,
+        "stack_bytes": chip.stack_bytes,
+        "damaged_lines": chip.damaged,
+        "serial_overruns": chip.serial_overruns,
+        **{name: int(last.get(name, 0)) for name in ("refused", "missed", "implausible", "late")},
+    }
+    numbers = {
+        "settled_rms_m": settled,
+        "desk_settled_rms_m": desk,
+        "difference_m": settled - desk,
+        "by_rounding_m": rounded - desk,
+        "by_delay_m": delayed - desk,
+        "all_rms_m": flown.all_rms_m,
+        "position_rms_m": flown.position_rms_m,
+        "awake_share": chip.awake_share,
+        "awake_s": 1e-6 * sum(row["awake_us"] for row in chip.rows[1:]),
+        "reported_s": chip.rows[-1]["time_s"] - chip.rows[0]["time_s"] if chip.rows else 0.0,
+        "delay_s": sum(vehicle.delays_s),
+        "longest_delay_s": max(vehicle.delays_s, default=math.nan),
+    }
+    along, cross = flown.beside()
+    pose, estimate, command = map(np.array, (flown.pose, flown.estimate_m, flown.command))
+    track = [flown.sample, pose[:, :3], estimate, flown.leg, along, cross, command]
+    return {
+        **{name: np.array([value], np.int64) for name, value in counts.items()},
+        **{name: np.array([value], float) for name, value in numbers.items()},
+        "track": np.column_stack(track)[np.newaxis],
+    }
 
 
-def measures(flights: list[ChipFlight], beside: dict[str, Floats]) -> dict[str, Any]:
+def measures(columns: montecarlo.Columns) -> dict[str, Any]:
     """Compute the numbers of the table; shares and counts are of all runs together."""
+
+    def total(name: str) -> int:
+        return int(columns[name].sum())
+
+    def share(name: str, of: str) -> float:
+        whole = float(columns[of].sum())
+        return float(columns[name].sum()) / whole if whole > 0 else math.nan
+
     numbers: dict[str, Any] = {
-        "runs": len(flights),
-        "finished_runs": sum(chip.vehicle.flight.finished for chip in flights),
-        "samples": sum(chip.vehicle.twin.sample for chip in flights),
-        "commands": sum(len(chip.vehicle.delays_s) for chip in flights),
-        "differing_commands": sum(chip.vehicle.differing for chip in flights),
+        "runs": len(columns["run"]),
+        "finished_runs": total("finished"),
+        "samples": total("samples"),
+        "commands": total("commands"),
+        "differing_commands": total("differing_commands"),
     }
     for name in ("settled_rms_m", "desk_settled_rms_m", "difference_m", "all_rms_m"):
-        numbers[name], numbers[f"{name}_se"] = mean_and_error(beside[name])
-    numbers["largest_difference_m"] = float(np.abs(beside["difference_m"]).max())
-    for name in ("by_rounding_m", "by_delay_m"):
-        numbers[name], _ = mean_and_error(beside[name])
-    delays = np.concatenate([chip.vehicle.delays_s for chip in flights])
-    last = [chip.rows[-1] for chip in flights if chip.rows]
-    awake_us = np.concatenate([[row["awake_us"] for row in chip.rows[1:]] for chip in flights])
-    span = sum(chip.rows[-1]["time_s"] - chip.rows[0]["time_s"] for chip in flights if chip.rows)
-    numbers["position_rms_m"], _ = mean_and_error(
-        np.array([chip.vehicle.flight.position_rms_m for chip in flights])
-    )
+        numbers[name], numbers[f"{name}_se"] = mean_and_error(columns[name])
+    numbers["largest_difference_m"] = float(np.abs(columns["difference_m"]).max())
+    for name in ("by_rounding_m", "by_delay_m", "position_rms_m"):
+        numbers[name], _ = mean_and_error(columns[name])
     numbers.update(
-        awake_share_simulated=float(np.mean([chip.awake_share for chip in flights])),
-        awake_share_by_board=1e-6 * float(awake_us.sum()) / span if span > 0 else math.nan,
-        stack_bytes=max(chip.stack_bytes for chip in flights),
-        command_delay_s=float(delays.mean()) if delays.size else math.nan,
-        longest_command_delay_s=float(delays.max()) if delays.size else math.nan,
-        lines_refused=int(sum(row["refused"] for row in last)),
-        readings_missed=int(sum(row["missed"] for row in last)),
-        implausible=int(sum(row["implausible"] for row in last)),
-        late=int(sum(row["late"] for row in last)),
-        damaged_lines=sum(chip.damaged for chip in flights),
-        serial_overruns=sum(chip.serial_overruns for chip in flights),
+        awake_share_simulated=float(columns["awake_share"].mean()),
+        awake_share_by_board=share("awake_s", "reported_s"),
+        stack_bytes=int(columns["stack_bytes"].max()),
+        command_delay_s=share("delay_s", "commands"),
+        longest_command_delay_s=float(np.max(columns["longest_delay_s"])),
+        lines_refused=total("refused"),
+        readings_missed=total("missed"),
+        implausible=total("implausible"),
+        late=total("late"),
+        damaged_lines=total("damaged_lines"),
+        serial_overruns=total("serial_overruns"),
     )
     return numbers
 
 
-def _samples(chip: ChipFlight) -> dict[str, Floats]:
-    flight = chip.vehicle.flight
-    along, cross = flight.beside()
-    pose, estimate, command = map(np.array, (flight.pose, flight.estimate_m, flight.command))
-    columns = {
-        "sample": np.array(flight.sample, float),
-        "north_m": pose[:, 0],
-        "east_m": pose[:, 1],
-        "depth_m": pose[:, 2],
-        "estimate_north_m": estimate[:, 0],
-        "estimate_east_m": estimate[:, 1],
-        "leg": np.array(flight.leg, float),
-        "along_m": along,
-        "cross_m": cross,
-    }
-    names = ("rudder_rad", "stern_planes_rad", "propeller_rev_s")
-    return {**columns, **dict(zip(names, command.T, strict=True))}
+def _each_run(columns: montecarlo.Columns) -> dict[str, Floats]:
+    return {name: columns[name].astype(float) for name in _EACH_RUN}
 
 
-def _figure(chip: ChipFlight, source: str) -> Figure:
+def _samples(one: montecarlo.Columns) -> dict[str, Floats]:
+    return dict(zip(_SAMPLES, one["track"][0].T, strict=True))
+
+
+def _figure(one: montecarlo.Columns, source: str) -> Figure:
     from auvest import plots  # here, because matplotlib takes long to import
 
-    columns = _samples(chip)
+    columns = _samples(one)
     time_s = (columns["sample"] - 1) * PERIOD_S
     figure = plots.new_figure((10.0, 6.0), f"{Path(source).name}: {time_s[-1]:.0f} s")
     grid = figure.add_gridspec(3, 2, width_ratios=(1.0, 1.25))
@@ -380,10 +458,10 @@ def _table(values: dict[str, Any], source: str) -> Table:
     return table(title, ("quantity", "value", "note"), rows, right={1})
 
 
-def _runs_table(beside: dict[str, Floats]) -> Table:
+def _runs_table(columns: montecarlo.Columns) -> Table:
     header = ("run", "settled / m", "without chip / m", "difference / m", "rounding", "delay")
     rows = [
         (f"{int(run)}", *(f"{value:.4f}" for value in cells))
-        for run, *cells in zip(*list(beside.values())[:6], strict=True)
+        for run, *cells in zip(*list(_each_run(columns).values())[:6], strict=True)
     ]
     return table("each run", header, rows, right=set(range(6)))

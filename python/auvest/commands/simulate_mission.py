@@ -7,6 +7,8 @@ Examples
 --------
   auvest simulate mission
 
+  auvest simulate mission --path dubins
+
   auvest simulate mission --track circle --filter ukf --guidance adaptive
 
   auvest simulate mission --outliers 0.05 --kernel igg --current 0.5
@@ -31,19 +33,46 @@ from auvest.commands.session import Session, failure, mean_over_runs
 from auvest.intervals import IntervalPolicy
 from auvest.kernels import KernelName
 from auvest.simulation import mission
-from auvest.simulation.mission import Estimate, Law, Mission, MissionResult, TrackKind
+from auvest.simulation.mission import (
+    Estimate,
+    Law,
+    Mission,
+    MissionResult,
+    PathKind,
+    TrackKind,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _VEHICLE = "Vehicle"
 _MISSION = Mission()
+#: Default of --arc with --path dubins: half the distance of the lanes.
+DUBINS_ARC_M = 20.0
 #: Default of --compass-bias, degrees.
 COMPASS_BIAS_DEG = math.degrees(_MISSION.compass_bias_rad)
 
 
 def command(
     track: Annotated[TrackKind, option(WORLD, "lawnmower: four lanes; circle.")] = "lawnmower",
+    path: Annotated[
+        PathKind,
+        option(
+            WORLD,
+            "From lane to lane. waypoints: corners, which no hull can fly; dubins: the shortest "
+            "curves that turn on --arc; spline: a smooth curve through points.",
+        ),
+    ] = "waypoints",
+    arc: Annotated[
+        float | None,
+        option(
+            WORLD,
+            "Radius of the turns, m. With waypoints arcs cut the corners, 0: corners. This hull "
+            "turns on 14.3 m.",
+            check=options.not_negative,
+            show_default="20 with dubins, else 0",
+        ),
+    ] = None,
     current: options.Current = _MISSION.current_m_s,
     current_direction: options.CurrentDirection = None,
     outliers: options.FixOutliers = 0.0,
@@ -56,14 +85,6 @@ def command(
     speed: Annotated[
         float, option(_VEHICLE, "Through the water, m/s.", check=positive)
     ] = _MISSION.speed_m_s,
-    arc: Annotated[
-        float,
-        option(
-            _VEHICLE,
-            "Radius of arcs instead of corners, m; 0: corners.",
-            check=options.not_negative,
-        ),
-    ] = 0.0,
     guidance: Annotated[
         Law, option(_VEHICLE, "Law; crab feeds the estimated current forward.")
     ] = "crab",
@@ -114,6 +135,7 @@ def command(
             )
         plan = Mission(
             track=track,
+            path=path,
             estimate=kind,
             guidance=guidance,
             interval=paces,
@@ -123,7 +145,7 @@ def command(
             dtype=dtype,
             speed_m_s=speed,
             **options.sea(current, current_direction, compass_bias, outliers, latency, dropout),
-            arc_m=arc,
+            arc_m=(DUBINS_ARC_M if path == "dubins" else 0.0) if arc is None else arc,
             runs=runs,
             seed=seed,
         )
@@ -187,12 +209,7 @@ def _figure(result: MissionResult) -> Figure:
     grid = figure.add_gridspec(4, 2, width_ratios=(1.0, 1.25))
     plane = figure.add_subplot(grid[:, 0])
     pose, estimate = result.pose[0], result.estimate_m[0]
-    if plan.track == "circle":
-        x, y, radius = mission.CIRCLE
-        turn = np.linspace(0, 2 * np.pi, 200)
-        wanted = np.column_stack([x + radius * np.cos(turn), y + radius * np.sin(turn)])
-    else:
-        wanted = mission.LAWNMOWER
+    wanted = mission.track_points(plan)
     plane.plot(wanted[:, 1], wanted[:, 0], color=plots.GREY, linewidth=3, alpha=0.4, label="track")
     plane.plot(pose[:, 1], pose[:, 0], color=plots.BLACK, linewidth=1.2, label="vehicle")
     plane.plot(estimate[:, 1], estimate[:, 0], color=plots.BLUE, linewidth=0.7, label="estimate")
@@ -224,6 +241,15 @@ def _figure(result: MissionResult) -> Figure:
     return figure
 
 
+def _track(plan: Mission) -> str:
+    if plan.track == "circle":
+        return plan.track
+    how = {"waypoints": "corners", "dubins": "Dubins curves", "spline": "a spline"}[plan.path]
+    if plan.arc_m > 0:
+        how = f"{'arcs' if plan.path == 'waypoints' else how} of {plan.arc_m:g} m"
+    return f"{plan.track} with {how}"
+
+
 def _table(values: dict[str, Any], plan: Mission) -> Table:
     def with_error(name: str, unit: str) -> tuple[str, str]:
         error = values[f"{name}_se"]
@@ -241,7 +267,7 @@ def _table(values: dict[str, Any], plan: Mission) -> Table:
         ("NEES of four states, mean (4 expected)", f"{values['nees_mean']:.2f}", ""),
     ]
     title = (
-        f"{plan.track}, {plan.estimate}, {plan.guidance}: {values['runs']} runs, "
+        f"{_track(plan)}, {plan.estimate}, {plan.guidance}: {values['runs']} runs, "
         f"{plan.degrees_of_freedom} degrees of freedom, current {plan.current_m_s:g} m/s, "
         f"seed {plan.seed}, {plan.dtype}"
     )

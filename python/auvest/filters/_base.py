@@ -31,6 +31,7 @@ from auvest._arguments import (
     as_step,
     as_steps,
     far_from_origin,
+    impossible_range,
     require_range,
 )
 from auvest._core import Convergence, Decision, Status
@@ -980,15 +981,7 @@ class GaussianFilter:
             )
         if status == Status.impossible_range:
             name, model = self._named_sensor(sensor)
-            limits = ""
-            if hasattr(model, "smallest_range_m") and hasattr(model, "largest_range_m"):
-                limits = (
-                    f"; its ranges are {model.smallest_range_m:g} to {model.largest_range_m:g} m"
-                )
-            first = float(np.ravel(np.asarray(z))[0])
-            return (
-                f"{name} cannot measure a range of {first:g} m{limits}; NaN is for no measurement"
-            )
+            return impossible_range(name, float(np.ravel(np.asarray(z))[0]), model)
         if status == Status.far_from_origin:
             if place is None:
                 return far_from_origin("x", self.x[:2], self._dtype)

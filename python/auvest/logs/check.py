@@ -28,6 +28,11 @@ SLOW_FIXES_S = 60.0
 SLOW_M_S = 0.02
 #: Faster turning than this, rad/s, is no vehicle's: degrees.
 FAST_TURN_RAD_S = 3.0
+#: Faster than this, m/s, is no vehicle: lengths in millimetres or centimetres.
+FAST_M_S = 50.0
+#: Sources that lie closer together than this share of their ranges are at one place, as degrees or
+#: kilometres put them.
+ONE_PLACE = 5e-3
 #: Steps of the clock that are longer than so many usual ones, in all files at once, are jumps.
 JUMP_STEPS = 10
 #: A silence shorter than this is no jump forwards, and a shorter way back none backwards, s.
@@ -41,6 +46,8 @@ CODE_LINES, REPEATED_LINES, REPEATED_SHARE = 2, 12, 0.05
 CODE_JUMP = 4.0
 #: Steps of a replay per line of a log; more are refused.
 STEPS_PER_LINE = 1000
+#: The least and the most x and y of no place at all.
+NOWHERE = np.array([[math.inf, math.inf], [-math.inf, -math.inf]])
 #: Longest and most telling steps that are remembered.
 _KEPT = 8
 
@@ -154,6 +161,8 @@ class FileSeen:
         self.first_equal: int | None = None
         self.sources: dict[int, SourceSeen] = {}
         self.path_m = 0.0
+        self.corners = NOWHERE  # of leaders
+        self._speeds: list[float] = []
         self._turns: list[float] = []
         self._medians: list[tuple[float, int]] = []
         self._newest = math.nan
@@ -173,6 +182,11 @@ class FileSeen:
     def usual_turn_rad_s(self) -> float:
         """Usual rate of turning, rad/s."""
         return float(np.median(self._turns)) if self._turns else 0.0
+
+    @property
+    def usual_speed_m_s(self) -> float:
+        """Usual speed of increments, m/s."""
+        return float(np.median(self._speeds)) if self._speeds else 0.0
 
     @property
     def span_s(self) -> float:
@@ -199,6 +213,8 @@ class FileSeen:
                 mine = rows[:, 1] == source
                 seen = self.sources.setdefault(source, SourceSeen())
                 seen.add(time[mine], rows[mine, 2], first + np.flatnonzero(mine))
+        if self.name == "leaders.csv":
+            self.corners = _around(self.corners, rows[:, 2:4])
         self._previous = rows[-1:]
 
     def _steps(self, rows: Rows, first: int, newest: Rows) -> None:
@@ -231,6 +247,7 @@ class FileSeen:
             self._turns += _middle(np.abs(rows[1:, 3])[known] / step[known])
             # An increment says what the craft did all through its step, unless it is far too short.
             usual = float(np.median(length[known] / step[known])) if known.any() else 0.0
+            self._speeds.append(usual)
             return length < 0.25 * usual * step
         self.path_m += float((np.abs(rows[:-1, 1]) * step).sum())
         self._turns += _middle(np.abs(rows[1:, 2]))
@@ -253,6 +270,11 @@ class FileSeen:
                 for source, seen in sorted(self.sources.items())
             }
         return made
+
+
+def _around(corners: Rows, places: Rows) -> Rows:
+    """Widen a box by these places."""
+    return np.array([np.minimum(corners[0], places.min(0)), np.maximum(corners[1], places.max(0))])
 
 
 def _middle(values: Rows) -> list[float]:
@@ -332,6 +354,7 @@ def survey(log: LogFolder, limits: Limits) -> Survey:
     if not any(one.verdict == "not_trusted" for one in units):
         found += _gaps(files, limits)
     found += _sources(files)
+    found += _places(log, files)
     return Survey(files, found + list(_origin(log)))
 
 
@@ -379,6 +402,12 @@ def _units(files: dict[str, FileSeen], limits: Limits) -> Iterator[Finding]:
             if seen.usual_turn_rad_s > FAST_TURN_RAD_S:
                 message = f"the craft would turn by {seen.usual_turn_rad_s:.3g} rad/s: degrees?"
                 yield finding("degrees", message, file=name)
+            if seen.usual_speed_m_s > FAST_M_S:
+                message = (
+                    f"the craft would move at {seen.usual_speed_m_s:.3g} m/s: millimetres or "
+                    "centimetres for metres?"
+                )
+                yield finding("millimetres", message, file=name)
         if name == "fixes.csv" and seen.lines > 2 and step > SLOW_FIXES_S:
             reach = max(one.high_m - one.low_m for one in seen.sources.values())
             if 1 < reach < SLOW_M_S * seen.span_s * len(seen.sources):
@@ -485,6 +514,25 @@ def _sources(files: dict[str, FileSeen]) -> Iterator[Finding]:
                 "code for 'no echo'? Leave such lines out"
             )
             yield finding("no_echo", message, file=seen.name, line=repeated.first_line)
+
+
+def _places(log: LogFolder, files: dict[str, FileSeen]) -> Iterator[Finding]:
+    measured = files.get("ranges.csv") or files.get("fixes.csv")
+    if measured is None or len(measured.sources) < 2:
+        return
+    corners = files["leaders.csv"].corners if "leaders.csv" in files else NOWHERE
+    beacons = [place for source, place in log.beacons().items() if source in measured.sources]
+    if beacons:
+        corners = _around(corners, np.array(beacons))
+    apart = float(np.hypot(*(corners[1] - corners[0])))
+    usual = float(np.mean([0.5 * (one.low_m + one.high_m) for one in measured.sources.values()]))
+    if apart < ONE_PLACE * usual:
+        message = (
+            f"all sources lie within {apart:.2g} m, {usual:.3g} m from the craft: degrees or "
+            "kilometres for metres?"
+        )
+        file = "leaders.csv" if "leaders.csv" in files else "beacons.csv"
+        yield finding("lengths_apart", message, file=file, verdict="doubtful")
 
 
 def _origin(log: LogFolder) -> Iterator[Finding]:

@@ -32,12 +32,16 @@ CAUSES: Mapping[str, tuple[str, Verdict]] = {
     "odometry_gap": ("odometry pauses while the craft moves", "doubtful"),
     "no_echo": ("a value that stands for 'no echo' is logged as a range", "doubtful"),
     "ignored_file": ("a file that no log has is not read", "sound"),
+    "ignored_settings": ("settings that such a log has no use for", "sound"),
     "local_origin": ("coordinates are far from (0, 0); an origin is subtracted", "sound"),
     # what the belief shows
     "not_converged": ("the ranges do not say where the craft is", "not_trusted"),
     "ambiguous": ("the ranges leave several places", "not_trusted"),
     "settling": ("the ranges leave one place, not yet confirmed", "doubtful"),
     # what innovations show
+    "not_used": ("measurements that no filter was given", "doubtful"),
+    "lengths_apart": ("ranges and positions differ in unit or origin", "not_trusted"),
+    "start_off": ("the place, the heading or the time of the start is wrong", "doubtful"),
     "heading_mirrored": ("the heading, or a bearing, turns the wrong way", "not_trusted"),
     "heading_turned": ("the heading, or a bearing, counts from another axis", "not_trusted"),
     "axes_exchanged": ("x and y of the sources are exchanged (NED, ENU)", "not_trusted"),

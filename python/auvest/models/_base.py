@@ -153,14 +153,6 @@ class ProcessModel(Model):
         return as_array("input", input, (len(self.input),), _FLOAT64).astype(np.float64)
 
 
-def require_range_limits(smallest_m: float, largest_m: float) -> None:
-    """Refuse a sensor that could measure no range."""
-    if not largest_m > smallest_m:
-        raise ValueError(
-            f"largest_range_m must be above smallest_range_m = {smallest_m}, not {largest_m}"
-        )
-
-
 class MeasurementModel(Model):
     """A measurement model: what a sensor would read in a state, and its noise.
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from auvest import _core
+from auvest._arguments import require_range_limits
 from auvest._fields import not_negative, number, pair, positive
-from auvest.models._base import MeasurementModel, require_range_limits
+from auvest.models._base import MeasurementModel
 
 _DEFAULTS = _core.sensor_defaults("RangeBearing")
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from auvest import _core
-from auvest._arguments import as_array
+from auvest._arguments import as_array, require_range_limits
 from auvest._fields import not_negative, number, positive
-from auvest.models._base import MeasurementModel, require_range_limits
+from auvest.models._base import MeasurementModel
 
 _DEFAULTS = _core.sensor_defaults("RangeBearingElevation")
 

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -80,7 +81,18 @@ def files(log: LogFolder, settings: Settings) -> list[Finding]:
     asked = limits(settings)
     seen = survey(log, asked)
     seen.refuse(log, asked)
-    return seen.findings
+    return [*seen.findings, *_idle(log, settings)]
+
+
+def _idle(log: LogFolder, settings: Settings) -> Iterator[Finding]:
+    """Name what was set, and is for the other kind of log."""
+    kind = "ranging" if log.tracking else "tracking"
+    ranging, tracking = ["odometry", "ranges"], ["fixes", "process", "interval"]
+    default = Settings()
+    for name in ranging if log.tracking else tracking:
+        if getattr(settings, name) != getattr(default, name):
+            message = f"[{name}] of the settings is of no use here: it is for logs of {kind}"
+            yield finding("ignored_settings", message)
 
 
 def innovations(
@@ -103,7 +115,7 @@ def innovations(
         return shown
     named = diagnosis.diagnose(log, settings, filter_name, gross=bool(shown))
     if named:  # it explains why one source has more of it than others
-        shown = [one for one in shown if one.cause != "source_off"]
+        shown = [one for one in shown if one.cause not in ("source_off", "start_off")]
     return [*named, *shown]
 
 
@@ -125,7 +137,7 @@ def check(path: Path, settings: Settings, filter_name: FilterName | None = None)
     try:
         log = LogFolder(path, truth=False)
         shown = survey(log, limits(settings))
-        found += shown.findings
+        found += [*shown.findings, *_idle(log, settings)]
         seen = shown.files
         if worst(one.verdict for one in found) != "not_trusted":
             shown.refuse(log, limits(settings))

@@ -135,8 +135,13 @@ def find_settings(name: str) -> Settings:
     ValueError
         As :func:`read_settings`.
     """
-    packaged = name in packaged_settings() and not Path(name).exists()
-    return read_settings(_PACKAGED / f"{name}.toml" if packaged else Path(name))
+    path = Path(name)
+    if not path.exists():
+        if name not in packaged_settings():
+            known = ", ".join(packaged_settings())
+            raise ValueError(f"{name}: there is no such file; the package's settings are {known}")
+        path = _PACKAGED / f"{name}.toml"
+    return read_settings(path)
 
 
 def read_settings(path: Path) -> Settings:

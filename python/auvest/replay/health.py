@@ -9,6 +9,7 @@ how often the filter lost its track, and whether one source stands apart from th
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -44,6 +45,20 @@ LOST_NOT_TRUSTED = 0.05
 SOURCE_OFF, SOURCE_TIMES = 0.45, 3.0
 #: So many measurements in a row beyond three sigma: the track is not to be trusted there.
 ASTRAY = 5
+#: So many at the very beginning: it is the start that does not fit.
+START_ASTRAY = 4
+#: Ranges so many times as long as the start says, or as short, are in other units or from another
+#: origin than the positions.
+LENGTHS_APART = 3.0
+#: Share of the measurements that no filter was given, which makes a replay doubtful.
+UNUSED_DOUBTFUL = 0.25
+
+#: Why a measurement was not used, by its outcome.
+WHY = {
+    tables.BEFORE_START: "before the start",
+    tables.AFTER_END: "after the last line of the odometry",
+    tables.NO_POSITION: "of a source whose position is not known then",
+}
 
 #: What a replay keeps of each measurement.
 COLUMNS = (
@@ -130,15 +145,33 @@ class Residuals:
 
     def __init__(self) -> None:
         self.recoveries = 0
+        self.unused: Counter[tuple[int, str]] = Counter()  # by source and outcome
+        self.lines: Counter[int] = Counter()  # by source
         self.ranges = 0
         self.lost = 0  # ranges until the first that told where the craft is
         self.convergence = ""
         self.settled_s = math.nan
         self._samples = Samples(COLUMNS, KEPT)
+        self._beginning: list[Columns] = []
 
     def add(self, batch: Batch) -> None:
         """Take one batch."""
-        self.recoveries += int(batch.measurements["recovered"].sum())
+        measured = batch.measurements
+        self.recoveries += int(measured["recovered"].sum())
+        rows = {**measured, "range_m": batch.ranges_m}
+        self._samples.add(rows)
+        for source in np.unique(measured["source"]).tolist():
+            mine = measured["source"] == source
+            self.lines[int(source)] += int(mine.sum())
+            for outcome in tables.UNUSED:
+                self.unused[int(source), outcome] += int(
+                    (measured["outcome"][mine] == outcome).sum()
+                )
+        if len(self._beginning) < FEW:
+            compared = np.flatnonzero(~np.isnan(measured["nis"]))
+            self._beginning += [
+                {name: rows[name][k : k + 1] for name in COLUMNS} for k in compared[:FEW].tolist()
+            ]
         told = np.flatnonzero(batch.located)
         if self.lost == self.ranges:
             self.lost += int(told[0]) if len(told) else len(batch.located)
@@ -149,13 +182,17 @@ class Residuals:
             settled = np.flatnonzero(said == tables.SETTLED)
             if len(settled) and math.isnan(self.settled_s):
                 self.settled_s = float(batch.estimates["time_s"][settled[0]])
-        self._samples.add({**batch.measurements, "range_m": batch.ranges_m})
 
     def rows(self) -> Columns:
         """Give those that were compared with a prediction."""
         columns = self._samples.columns()
         compared = ~np.isnan(columns["nis"])
         return {name: values[compared] for name, values in columns.items()}
+
+    def beginning(self) -> Columns:
+        """Give the first of them, however many there are."""
+        parts = self._beginning or [dict.fromkeys(COLUMNS, np.empty(0))]
+        return {name: np.concatenate([part[name] for part in parts]) for name in COLUMNS}
 
 
 def numbers_measured(rows: Columns) -> int:
@@ -177,12 +214,20 @@ def findings(residuals: Residuals) -> list[Finding]:
     """Say what the innovations of a replay show, without asking why."""
     rows = residuals.rows()
     count = len(rows["nis"])
+    found = _unused(residuals, numbers_measured(rows))
     if count < FEW:
-        return []
+        return found
     numbers = numbers_measured(rows)
     within = rows["nis"] < WITHIN[numbers]
-    found = []
     beyond = 1 - float(within.mean())
+    found += _beginning(residuals.beginning(), numbers, beyond)
+    blind = float(_blind(rows).mean())
+    if blind > BEYOND_DOUBTFUL:
+        message = (
+            f"the filter does not know where it is: at {100 * blind:.0f} % of {count} measurements "
+            "the sigma of its prediction is larger than any range"
+        )
+        found.append(finding("innovations", message, verdict="not_trusted"))
     if beyond > BEYOND_DOUBTFUL:
         bad = beyond > BEYOND_NOT_TRUSTED
         message = f"{100 * beyond:.0f} % of {count} measurements are beyond three sigma"
@@ -205,6 +250,66 @@ def findings(residuals: Residuals) -> list[Finding]:
         bad = residuals.recoveries >= RECOVERIES_NOT_TRUSTED
         found.append(finding("recoveries", message, verdict="not_trusted" if bad else "doubtful"))
     return found + _apart(rows, within)
+
+
+def _unused(residuals: Residuals, numbers: int) -> list[Finding]:
+    """Find measurements that no filter was given."""
+    file = "fixes.csv" if numbers == 2 else "ranges.csv"
+    lines = sum(residuals.lines.values())
+    found = []
+    for source, of_source in sorted(residuals.lines.items()):
+        unknown = residuals.unused[source, tables.NO_POSITION]
+        if unknown == of_source:
+            message = (
+                f"source {source}: its position is known at none of its {of_source} lines: is its "
+                "number in beacons.csv or leaders.csv, and has leaders.csv the same clock?"
+            )
+            found.append(finding("not_used", message, file=file))
+    counts = {
+        outcome: sum(residuals.unused[source, outcome] for source in residuals.lines)
+        for outcome in tables.UNUSED
+    }
+    unused = sum(counts.values())
+    if lines and (unused == lines or (unused > UNUSED_DOUBTFUL * lines and not found)):
+        why = ", ".join(f"{count} {WHY[outcome]}" for outcome, count in counts.items() if count)
+        message = f"{unused} of {lines} lines are not used: {why}"
+        verdict: Verdict = "not_trusted" if unused == lines else "doubtful"
+        found.append(finding("not_used", message, file=file, verdict=verdict))
+    return found
+
+
+def _blind(rows: Columns) -> npt.NDArray[np.bool_]:
+    """Tell measurements that say nothing: the filter's own prediction is wider than all ranges.
+
+    To a filter that has lost its track altogether everything fits.
+    """
+    blind: npt.NDArray[np.bool_] = rows["sigma_0"] > rows["range_m"].max(initial=0.0)
+    return blind & (rows["near_field"] == 0)
+
+
+def _beginning(rows: Columns, numbers: int, beyond: float) -> list[Finding]:
+    """Find a start that does not fit: the first measurements are beyond three sigma."""
+    out = rows["nis"] >= WITHIN[numbers]
+    first = len(out) if out.all() else int(np.argmin(out))
+    if first < START_ASTRAY:
+        return []
+    plain = np.flatnonzero(rows["near_field"][:first] == 0)
+    measured = rows["range_m"][plain]
+    expected = np.maximum(np.abs(measured - rows["innovation_0"][plain]), 1e-3)
+    ratio = float(np.median(measured / expected)) if len(plain) else 1.0
+    if not 1 / LENGTHS_APART < ratio < LENGTHS_APART:
+        message = (
+            f"ranges are {ratio:.3g} times as long as the way from the start to the sources: have "
+            "they the same unit and origin?"
+        )
+        return [finding("lengths_apart", message)]
+    if beyond > BEYOND_DOUBTFUL:
+        return []
+    message = (
+        f"the first {first} measurements lie beyond three sigma, and most of the others do not: is "
+        "the place, the heading or the time of the start wrong, or are its sigmas too small?"
+    )
+    return [finding("start_off", message)]
 
 
 def _apart(rows: Columns, within: npt.NDArray[np.bool_]) -> list[Finding]:
@@ -280,7 +385,7 @@ def health(residuals: Residuals, found: Iterable[Finding]) -> Health:
         recoveries=residuals.recoveries,
         recovery_times_s=rows["time_s"][rows["recovered"] != 0][:20].tolist(),
         sources=[_source(rows, within, source) for source in np.unique(rows["source"]).tolist()],
-        untrusted_s=_astray(rows["time_s"], within),
+        untrusted_s=_astray(rows["time_s"], within & ~_blind(rows)),
     )
 
 

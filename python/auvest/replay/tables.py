@@ -13,7 +13,7 @@ Columns: TypeAlias = Mapping[str, npt.NDArray[Any]]
 
 ACCEPTED, DOWNWEIGHTED, REJECTED = "accepted", "downweighted", "rejected"
 HELD_OUT = "held out"
-BEFORE_START, AFTER_END, NO_POSITION = "before start", "after end", "no position"
+BEFORE_START, AFTER_END, NO_POSITION = UNUSED = "before start", "after end", "no position"
 #: By the number of auvest.Decision.
 DECISIONS = np.array([ACCEPTED, DOWNWEIGHTED, REJECTED])
 #: What can become of a measurement, in the order of reports.

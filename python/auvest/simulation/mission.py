@@ -25,6 +25,7 @@ from auvest._fields import (
     number,
     positive,
 )
+from auvest.guidance import DubinsPath, SplinePath
 from auvest.intervals import (
     FixedInterval,
     IntervalPolicy,
@@ -39,10 +40,13 @@ Floats: TypeAlias = npt.NDArray[np.float64]
 TrackKind: TypeAlias = Literal["lawnmower", "circle"]
 Estimate: TypeAlias = Literal["truth", "fixes", "ukf", "model-aided"]
 Law: TypeAlias = Literal["adaptive", "crab", "line-of-sight", "integral", "vector-field"]
+PathKind: TypeAlias = Literal["waypoints", "dubins", "spline"]
 DType: TypeAlias = Literal["float64", "float32"]
 TRACKS: tuple[TrackKind, ...] = ("lawnmower", "circle")
 ESTIMATES: tuple[Estimate, ...] = ("truth", "fixes", "ukf", "model-aided")
 LAWS: tuple[Law, ...] = ("adaptive", "crab", "line-of-sight", "integral", "vector-field")
+
+PATHS: tuple[PathKind, ...] = ("waypoints", "dubins", "spline")
 
 #: Corners of the lawnmower, m; centre and radius of the circle, m.
 LAWNMOWER = np.array(
@@ -53,6 +57,7 @@ CIRCLE = (80.0, 80.0, 40.0)
 #: Steps of all runs together that are kept at most: 200 bytes each.
 MAX_STEPS = 5_000_000
 _ROWS = 8000
+_MOST_POINTS = 20_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,6 +68,10 @@ class Mission(Checked):
     ----------
     track : {"lawnmower", "circle"}
         Four lanes of 120 m, 40 m apart; or a circle of radius 40 m for ``circle_s``.
+    path : {"waypoints", "dubins", "spline"}
+        How the lawnmower goes from lane to lane: corners (or arcs of ``arc_m``, which cut them);
+        the shortest curves that turn on ``arc_m``; a spline through points of the lanes and of half
+        circles. The hull turns on 14.3 m at 900 rpm, so it misses a corner by 10 m.
     estimate : {"truth", "fixes", "ukf", "model-aided"}
         What guidance takes for the position: the truth (no sensor has noise), the last USBL fix, a
         UKF of constant acceleration, or an EKF of dead reckoning with the current in its state
@@ -103,7 +112,7 @@ class Mission(Checked):
         current, m^2/s^3.
     lookahead_m, switch_m, end_m, arc_m
         Look-ahead distance; lead before a corner; end before the last waypoint; radius of arcs
-        instead of corners (0: corners).
+        instead of corners (0: corners), and of the turns of "dubins", which needs one.
     circle_s, most_s
         Length of the circle; longest lawnmower.
     runs, seed : int
@@ -116,6 +125,7 @@ class Mission(Checked):
     """
 
     track: TrackKind = choice("lawnmower", "circle")
+    path: PathKind = choice("waypoints", "dubins", "spline")
     estimate: Estimate = choice("model-aided", "truth", "fixes", "ukf")
     guidance: Law = choice("crab", "adaptive", "line-of-sight", "integral", "vector-field")
     interval: IntervalPolicy = _FIXED
@@ -165,6 +175,14 @@ class Mission(Checked):
                 f"guidance 'crab' needs an estimate of the current: 'truth' or 'model-aided', not "
                 f"{self.estimate!r}"
             )
+        if self.path != "waypoints" and self.track == "circle":
+            raise ValueError(f"path {self.path!r} is for the lawnmower: a circle has no corner")
+        if self.path == "dubins" and self.arc_m == 0:
+            raise ValueError(
+                "path 'dubins' needs arc_m, the radius of its turns: 20 fits lanes 40 m apart"
+            )
+        if self.path == "spline" and self.arc_m > 0:
+            raise ValueError("arc_m does nothing with path 'spline', which bends as its points lie")
         if self.kernel is not None:
             object.__setattr__(self, "kernel", as_kernel(self.kernel))
         if self.recovery is not None:
@@ -182,8 +200,8 @@ class MissionResult:
     Attributes
     ----------
     settled_rms_m, all_rms_m : ndarray, shape (runs,)
-        Cross-track error beside the active leg: from 50 m into a leg (60 s into the circle), and
-        corners too.
+        Cross-track error beside the active leg: from 50 m into a leg (60 s into the circle, and
+        into a lawnmower of curves), and all of it, corners too.
     position_rms_m, duration_s, mean_interval_s, rudder_travel_rad_s : ndarray, shape (runs,)
         Error of the estimate; length of the run; mean time between fixes; mean rate of the rudder.
     fixes, refused : ndarray, shape (runs,)
@@ -304,12 +322,52 @@ def simulate(
     return finished(columns)
 
 
+def track_points(mission: Mission) -> Floats:
+    """Give points of the track that a mission is to fly, for a figure.
+
+    Parameters
+    ----------
+    mission : Mission
+        Arcs of a lawnmower of waypoints are drawn as corners.
+
+    Returns
+    -------
+    ndarray, shape (n, 2)
+        North and east, m; about 1 m apart where the track bends.
+    """
+    as_instance("mission", mission, Mission)
+    if mission.track == "circle":
+        x, y, radius = CIRCLE
+        turn = np.linspace(0, 2 * np.pi, 250)
+        return np.column_stack([x + radius * np.cos(turn), y + radius * np.sin(turn)])
+    if mission.path == "waypoints":
+        return LAWNMOWER.copy()
+    plan = _core.mission_curve_plan(mission.path)
+    path: DubinsPath | SplinePath
+    if mission.path == "dubins":
+        path = DubinsPath(plan, radius_m=mission.arc_m)
+    else:
+        path = SplinePath(plan)
+    x, y = plan[0, :2]
+    points = [(x, y)]
+    for _ in range(_MOST_POINTS):
+        if path.finished:
+            break
+        at = path.locate(x, y)
+        sine, cosine = np.sin(at.direction_rad), np.cos(at.direction_rad)
+        x, y = x + at.cross_m * sine, y - at.cross_m * cosine  # on the path
+        points.append((x, y))
+        x, y = x + cosine, y + sine
+    return np.array(points)
+
+
 def core_scenario(mission: Mission) -> dict[str, Any]:
     """Give a mission as the core takes it."""
     kernel = Unit() if mission.kernel is None else as_kernel(mission.kernel)
     return {
         **{name: getattr(mission, name) for name in _DEFAULTS},
         "track": mission.track,
+        "path": mission.path,
         "estimate": mission.estimate,
         "guidance": mission.guidance,
         "interval": core_interval(mission.interval, "float64"),

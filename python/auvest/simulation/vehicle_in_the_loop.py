@@ -59,6 +59,7 @@ def chip_mission(**options: Any) -> Mission:
         "usbl_noise_m",
         "usbl_noise_rad",
         "degrees_of_freedom",
+        "path",
         "arc_m",
         "switch_m",
         "end_m",

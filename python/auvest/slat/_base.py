@@ -27,6 +27,8 @@ from auvest._arguments import (
     as_kind,
     as_number,
     as_step,
+    far_from_origin,
+    impossible_range,
     require_range,
 )
 from auvest._core import Status
@@ -199,7 +201,13 @@ class Steps:
         heard = (z, None if self._deaf else master)
         device = self._as_device(sonar)
         self._do(
-            "update", heard, lambda: self._as_echoes(*heard), self._unknown, device, self._random
+            "update",
+            heard,
+            lambda: self._as_echoes(*heard),
+            self._unknown,
+            device,
+            self._random,
+            heard=(z, sonar),
         )
 
     def run(
@@ -304,8 +312,9 @@ class Steps:
                 rebirths=out["rebirths"][:done],
             )
             self._status = status
-        if self._status != Status.ok:
-            raise FilterError("run", self._status, step=done, partial=result)
+            hint = self._why(status, echoes, sonar)
+        if status != Status.ok:
+            raise FilterError("run", status, step=done, partial=result, hint=hint)
         if interrupted:
             raise Interrupted(result)
         return result
@@ -362,6 +371,16 @@ class Steps:
             self._require_started(twin, arrays["counts"])
             self._require_legal(twin)
             self._core_steps, self._random, self._status = twin, random, Status.ok
+
+    def _require_local(self, name: str, pose: Floats) -> None:
+        """Refuse a start where motion is rounded away, however little is known of the position.
+
+        What counts is how far the noise of the speed lets the slave go in a second.
+        """
+        is_coarse = getattr(_core, f"is_coarse_{self._dtype.name}")
+        way = self._motion.sigma_speed_m_s**2
+        if any(is_coarse(float(place), way) for place in pose[:2]):
+            raise ValueError(far_from_origin(name, pose[:2], self._dtype))
 
     def _require_started(self, core: Any, counts: npt.NDArray[np.int64]) -> None:  # noqa: ARG002
         """Refuse the state of a filter that was never started: there is none such in Python."""
@@ -435,7 +454,12 @@ class Steps:
             return getattr(self._core_steps, name)
 
     def _do(
-        self, name: str, plain: tuple[Any, ...], convert: Callable[[], tuple[Any, ...]], *rest: Any
+        self,
+        name: str,
+        plain: tuple[Any, ...],
+        convert: Callable[[], tuple[Any, ...]],
+        *rest: Any,
+        heard: tuple[Any, Sonar | None] = (None, None),
     ) -> None:
         """Have the core do it with arguments as they are, or converted where they are not plain."""
         with self._exclusive:
@@ -448,8 +472,20 @@ class Steps:
                 if self._shared and error.status == Status.bad_parameter:
                     raise ValueError(_NEEDS_KNOWN) from None
                 action = name if name == "update" else f"{name}(dt={plain[0]})"
-                raise FilterError(action, error.status) from None
+                hint = self._why(error.status, *heard)
+                raise FilterError(action, error.status, hint=hint) from None
             self._status = Status.ok
+
+    def _why(self, status: Status, z: Any, sonar: Sonar | None) -> str:
+        """Explain a status that says less than is known here; empty for the others."""
+        if status == Status.impossible_range:
+            device = sonar or self._sonar
+            ranges = np.asarray(z, np.float64).reshape(-1, 2)[:, 0]
+            inside = (ranges >= device.smallest_range_m) & (ranges <= device.largest_range_m)
+            return impossible_range("Sonar", ranges[~np.isnan(ranges) & ~inside][0], device)
+        if status == Status.far_from_origin:
+            return far_from_origin("x", self._slave()[0][:2], self._dtype)
+        return ""
 
     def _as_master(self, n: int) -> int:
         count = self._core_steps.masters
@@ -552,12 +588,15 @@ class SlatFilter(Steps):
         n = self._motion.pose_states
         state = as_array("x0", x0, (n,), self._dtype)
         covariance = as_covariance("P0", P0, n, self._dtype, definite=False)
+        self._require_local("x0", state)
         self._prepare()
         self._random = _core.Random(seed)
         self._status = Status.ok
         try:
             self._core_steps.reset(state, covariance, self._random)
         except _core.StatusError as error:
+            if error.status == Status.far_from_origin:
+                raise ValueError(far_from_origin("x0", state[:2], self._dtype)) from None
             raise ValueError(f"x0, P0 or the parameters are refused: {error}") from None
 
     def _prepare(self) -> None:
@@ -614,7 +653,7 @@ class SlatFilter(Steps):
         Parameters
         ----------
         x : array_like, shape (6,)
-            ``[x, y, vx, vy, ax, ay]``, m, m/s, m/s^2.
+            ``[x, y, vx, vy, ax, ay]``, m from the slave's origin, m/s, m/s^2.
         P : array_like, shape (6, 6)
             Covariance, symmetric positive definite.
 
@@ -637,6 +676,8 @@ class SlatFilter(Steps):
             try:
                 self._core_steps.add_master(state, covariance)
             except _core.StatusError as error:
+                if error.status == Status.far_from_origin:
+                    raise ValueError(far_from_origin("x", state[:2], self._dtype)) from None
                 if error.status != Status.not_positive_definite:
                     raise ValueError(f"x and P are refused: {error}") from None
                 raise ValueError(f"P must be positive definite in {self._dtype.name}") from None
@@ -665,6 +706,7 @@ class SlatFilter(Steps):
             self._unknown,
             device,
             self._random,
+            heard=(z, sonar),
         )
 
     def _as_params(self, given: Mapping[str, Any]) -> dict[str, Any]:

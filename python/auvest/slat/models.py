@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from typing import Any, ClassVar, Literal, TypeAlias
@@ -9,8 +10,8 @@ from typing import Any, ClassVar, Literal, TypeAlias
 import numpy as np
 
 from auvest import _core
-from auvest._arguments import as_array, require_range
-from auvest._fields import Checked, choice, flag, instance, not_negative, positive
+from auvest._arguments import as_array, require_range, require_range_limits
+from auvest._fields import Checked, choice, flag, instance, not_negative, number, positive
 from auvest.models import ConstantAcceleration
 
 _COMPASS = _core.compass_motion_defaults()
@@ -205,6 +206,10 @@ class Sonar(Checked):
         Where the bearing points: from the x axis, from the master to the slave (the paper's), or
         from the slave to the master; or from the slave's heading to the master, which needs a
         heading in the pose (:class:`UnicycleMotion`).
+    smallest_range_m, largest_range_m : float
+        What the instrument can measure, m: a range outside is refused, for it is a code or a fault;
+        defaults: 0 and infinity. A smallest one below 0 is for readings whose noise is not cut off
+        at 0.
 
     Raises
     ------
@@ -217,9 +222,12 @@ class Sonar(Checked):
     bearing: Literal["master_to_slave", "slave_to_master", "from_heading"] = choice(
         "master_to_slave", "slave_to_master", "from_heading"
     )
+    smallest_range_m: float = number(_SONAR["smallest_range_m"])
+    largest_range_m: float = positive(_SONAR["largest_range_m"], infinite=True)
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        require_range_limits(self.smallest_range_m, self.largest_range_m)
         for name in ("sigma_range_m", "sigma_bearing_rad"):
             value = getattr(self, name)
             if value <= 1e-6:
@@ -283,5 +291,6 @@ def core_sonar(model: Sonar, dtype: str) -> _core._Sonar:
     """Build the core's sonar in this precision."""
     params = asdict(model)
     bearing = params.pop("bearing")
-    require_range(params, dtype, squared=tuple(params))
+    finite = {name: value for name, value in params.items() if value != math.inf}
+    require_range(finite, dtype, squared=("sigma_range_m", "sigma_bearing_rad"))
     return getattr(_core, f"Sonar_{dtype}")(params, bearing)

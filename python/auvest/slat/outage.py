@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from auvest import _core
-from auvest._arguments import Exclusive, Floats, as_array, as_instance
+from auvest._arguments import Exclusive, Floats, as_array, as_instance, far_from_origin
 from auvest._core import Status
 from auvest.errors import FilterError
 from auvest.slat._base import SlatFilter, Steps, as_covariance
@@ -85,6 +85,7 @@ class Outage(Steps):
         n = self._motion.pose_states
         state = as_array("x", x, (n,), self._dtype)
         covariance = as_covariance("P", P, n, self._dtype, definite=False)
+        self._require_local("x", state)
         most = self._filter._max_masters
         if len(masters) > most:
             raise ValueError(f"masters has {len(masters)} elements, at most {most} are taken")
@@ -98,6 +99,14 @@ class Outage(Steps):
             try:
                 self._core_steps.share(state, covariance, states[heard], covariances[heard])
             except _core.StatusError as error:
+                if error.status == Status.far_from_origin:
+                    places = {
+                        "x": state,
+                        **{f"masters[{k}][0]": one for k, one in enumerate(states)},
+                    }
+                    name = max(places, key=lambda one: float(np.abs(places[one][:2]).max()))
+                    message = far_from_origin(name, places[name][:2], self._dtype)
+                    raise ValueError(message) from None
                 raise ValueError(f"the shared state is refused: {error}") from None
 
     def _require_started(self, core: Any, counts: npt.NDArray[np.int64]) -> None:

@@ -117,6 +117,41 @@ TEST_CASE_TEMPLATE("pilot: nothing before it is started, and no start with what 
         Status::kBadParameter);
 }
 
+TEST_CASE_TEMPLATE("pilot: a start that is refused leaves the mission under way as it is", Scalar,
+                   float, double) {
+  using Pilot = auvest::Pilot<Scalar>;
+  using Point = auvest::Waypoint<Scalar>;
+  Pilot pilot = started<Pilot>(settings<Scalar>());
+  Pilot twin = started<Pilot>(settings<Scalar>());
+  const Scalar nan = nan_of<Scalar>();
+  static const Point back[] = {{50, 50}, {-30, 50}};
+  static const Point twice[] = {{5, 5}, {5, 5}};
+  for (int k = 0; k < 40; ++k) {
+    if (k % 10 == 5) {
+      CHECK(pilot.start(back, 2, 50, 50, nan) == Status::kNotFinite);
+      CHECK(pilot.start(back, 2, nan, 50, 2) == Status::kNotFinite);
+      CHECK(pilot.start(back, 2, 50, std::numeric_limits<Scalar>::max(), 2) != Status::kOk);
+      CHECK(pilot.start(twice, 2, 50, 50, 2) == Status::kBadParameter);
+      CHECK(pilot.path().report().problem == auvest::PlanProblem::kTooClose);
+      CHECK(pilot.start(back, 1, 50, 50, 2) == Status::kBadParameter);
+    }
+    const auto command = step(pilot, steady<Scalar>());
+    const auto expected = step(twin, steady<Scalar>());
+    REQUIRE(command.rudder_rad == expected.rudder_rad);
+    REQUIRE(command.propeller_rev_s == expected.propeller_rev_s);
+    REQUIRE(pilot.mode() == PilotMode::kUnderWay);
+    REQUIRE(pilot.filter().x()(0) == twin.filter().x()(0));
+    REQUIRE(pilot.filter().P()(0, 0) == twin.filter().P()(0, 0));
+    REQUIRE(pilot.wants_fix() == twin.wants_fix());
+    REQUIRE(pilot.cross_track_m() == twin.cross_track_m());
+  }
+  // A fix that was so before the refusals is still taken at its own time.
+  const auto fix = fix_of(pilot, 5, 0.2);
+  CHECK(pilot.update(fix, Scalar(1)).status == Status::kOk);
+  CHECK(twin.update(fix, Scalar(1)).status == Status::kOk);
+  CHECK(pilot.filter().x()(1) == twin.filter().x()(1));
+}
+
 TEST_CASE_TEMPLATE("pilot: a silent sensor stops the vehicle after its time, or does not", Scalar,
                    float, double) {
   using Pilot = auvest::Pilot<Scalar>;

@@ -157,7 +157,8 @@ void check_large_numbers() {
         REQUIRE(master.P.allFinite());
         if (status != Status::kOk) REQUIRE(slave.x == before.x);
       }
-      CHECK((status == Status::kOk || status == Status::kOverflow));
+      CHECK((status == Status::kOk || status == Status::kOverflow ||
+             status == Status::kFarFromOrigin));
       if (dt >= 1e15f || speed > 1e20f) CHECK(status == Status::kOverflow);
     }
   }
@@ -206,6 +207,127 @@ TEST_CASE("Outage: a first prediction that is refused leaves communication up") 
   pose.P(1, 0) = pose.P(0, 1) = 2;
   CHECK(outage.share(pose, &master, 1) == Status::kNotPositiveDefinite);
   CHECK(outage.mode() == auvest::Communication::kDown);
+}
+
+/// Ranges that no sonar measures are refused by name, and nothing has changed.
+template <class Filter>
+void check_impossible_ranges() {
+  auvest::Sonar<float>::Params limits;
+  const auto status = [&](float range) {
+    Started<Filter> one;
+    const auto before = one.filter->slave();
+    const Random numbers = one.random;
+    const Echo<float> echo = {Vector<float, 2>(range, -1.5f), 0};
+    const Status said = one.filter->update(&echo, 1, auvest::Sonar<float>(limits), one.random);
+    if (said == Status::kOk) return said;
+    CHECK(one.filter->slave().x == before.x);
+    CHECK(one.filter->slave().P == before.P);
+    CHECK(one.filter->safeguards().report().refused == 0);
+    CHECK(next_of(numbers) == next_of(one.random));
+    return said;
+  };
+  CHECK(status(-1) == Status::kImpossibleRange);
+  CHECK(status(0) == Status::kOk);
+  CHECK(status(9999) == Status::kOk);
+  limits.smallest_range_m = 2;
+  limits.largest_range_m = 500;
+  CHECK(status(1.9f) == Status::kImpossibleRange);
+  CHECK(status(300) == Status::kOk);
+  CHECK(status(9999) == Status::kImpossibleRange);
+  limits.smallest_range_m = -3;  // noise that is not cut off at 0
+  CHECK(status(-2) == Status::kOk);
+  limits.largest_range_m = -4;
+  CHECK(status(300) == Status::kBadParameter);
+}
+
+TEST_CASE("SLAT: ranges that the sonar cannot measure are refused") {
+  check_impossible_ranges<Ekf>();
+  check_impossible_ranges<ImmEkf>();
+  check_impossible_ranges<First>();
+  check_impossible_ranges<Second>();
+  check_impossible_ranges<Joint>();
+  check_impossible_ranges<Shared>();
+}
+
+// Coordinates of a map: floats are 0.25 m apart there, and a slave would stand still.
+const float kNorthing = 3948996.0f;
+
+Belief<float, 2> pose_at(float x, float sigma) {
+  Belief<float, 2> pose;
+  pose.x << x, 0;
+  pose.P << sigma * sigma, 0, 0, sigma * sigma;
+  return pose;
+}
+
+template <class Filter>
+void check_far_places() {
+  Started<Filter> one;
+  Filter& filter = *one.filter;
+  CHECK(filter.reset(pose_at(kNorthing, 0.1f), one.random) == Status::kFarFromOrigin);
+  CHECK(filter.masters() == 1);
+  CHECK(filter.reset(pose_at(kNorthing, 10), one.random) == Status::kOk);
+  CHECK(filter.reset(pose_at(4000, 0), one.random) == Status::kOk);
+  auto master = master_belief<float>(double(kNorthing), 0, 0, 0, 0.1);
+  CHECK(filter.add_master(master) == Status::kFarFromOrigin);
+  CHECK(filter.masters() == 0);
+  master.x(0) = 4000;
+  CHECK(filter.add_master(master) == Status::kOk);
+}
+
+/// A slave that drifts far off, as sure of its way as a float is not, says so before it stands
+/// still.
+template <class Filter>
+void check_drift(Filter& filter, Random& random) {
+  REQUIRE(filter.reset(pose_at(0, 1e-3f), random) == Status::kOk);
+  Status status = Status::kOk;
+  float gone = 0;
+  while (status == Status::kOk && gone < 1e5f) {
+    gone = filter.slave().x(0);
+    status = filter.predict(100, {5.0f, 0.0f}, random);
+  }
+  CHECK(status == Status::kFarFromOrigin);
+  CHECK(gone > 4096);
+  CHECK(filter.slave().x(0) == gone);
+}
+
+TEST_CASE("SLAT: starts and masters so far that the format is coarse are refused") {
+  check_far_places<Ekf>();
+  check_far_places<ImmEkf>();
+  check_far_places<First>();
+  check_far_places<Second>();
+  check_far_places<Joint>();
+  check_far_places<Shared>();
+  auvest::DeadReckoning<Motion> reckoning((Motion()));
+  Random random(1);
+  CHECK(reckoning.reset(pose_at(kNorthing, 0.1f), random) == Status::kFarFromOrigin);
+  auvest::Outage<Ekf, 1> outage(Ekf(good_odometry(), Master<float>()));
+  auto master = master_belief<float>(0, double(kNorthing), 0, 0, 0.1);
+  CHECK(outage.share(pose_at(kNorthing, 0.1f), &master, 0) == Status::kFarFromOrigin);
+  CHECK(outage.share(pose_at(0, 0.1f), &master, 1) == Status::kFarFromOrigin);
+  CHECK(outage.mode() == auvest::Communication::kNever);
+}
+
+TEST_CASE("SLAT: a slave that drifts so far that it would stand still is not predicted") {
+  Motion::Params sure;
+  sure.sigma_speed_m_s = 1e-7f;
+  sure.sigma_heading_rad = 0;
+  const Motion motion(sure);
+  Random random(1);
+  auvest::DeadReckoning<Motion> reckoning(motion);
+  check_drift(reckoning, random);
+  Ekf ekf(motion, Master<float>());
+  check_drift(ekf, random);
+  ImmEkf imm(motion, Three());
+  check_drift(imm, random);
+  std::vector<float> storage(Joint::Set::storage_size(16) + Second::Set::storage_size(16));
+  First first(motion, Master<float>(), First::Params(), storage.data(), 16);
+  check_drift(first, random);
+  Second second(motion, Master<float>(), Second::Params(), storage.data(), 16);
+  check_drift(second, random);
+  Joint joint(motion, Master<float>(), Joint::Params(), storage.data(), 16);
+  check_drift(joint, random);
+  Shared shared(motion, Master<float>(), Shared::Params(), storage.data(), 16);
+  check_drift(shared, random);
 }
 
 // ---- Hours of silence --------------------------------------------------------------------------

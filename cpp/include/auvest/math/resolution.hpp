@@ -57,6 +57,14 @@ AUVEST_INLINE bool is_coarse(double x, double variance) {
   return 2 * detail::stored_exponent(x) - known > 1023 + 2 * DBL_MANT_DIG - 6;
 }
 
+/// False where no number with this square, or a smaller one, is coarse, whatever its variance.
+AUVEST_INLINE bool may_be_coarse(const float& square) {
+  return detail::stored_exponent(square) > 127 + kFinestExponent + 2 * FLT_MANT_DIG - 6;
+}
+AUVEST_INLINE bool may_be_coarse(double square) {
+  return detail::stored_exponent(square) > 1023 + kFinestExponent + 2 * DBL_MANT_DIG - 6;
+}
+
 }  // namespace math
 }  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

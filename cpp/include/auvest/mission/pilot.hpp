@@ -148,16 +148,19 @@ class Pilot {
   }
 
   /// Takes a plan, which must live as long as the pilot, and begins at this place [m] and heading
-  /// [rad]. On anything but kOk there is no mission; path().report() says what is wrong with a
-  /// plan.
+  /// [rad]. On anything but kOk a mission that is under way goes on; path().report() says what is
+  /// wrong with a plan.
   Status start(const Waypoint<Scalar>* plan, std::uint16_t count, Scalar x_m, Scalar y_m,
                Scalar heading_rad) {
-    count_ = 0;
     Status status = check();
+    if (status == Status::kOk && !math::is_finite(heading_rad)) status = Status::kNotFinite;
+    if (status == Status::kOk && path_.examine(plan, count).status() == Status::kOk) {
+      status = begin_filter(x_m, y_m);
+    }
+    // What refuses now is the plan, before anything has changed.
     if (status == Status::kOk) status = path_.start(plan, count);
-    if (status == Status::kOk) status = begin_filter(x_m, y_m);
-    if (status == Status::kOk) status = autopilot_.restart(heading_rad);
     if (status != Status::kOk) return status;
+    autopilot_.restart(heading_rad);
     plan_ = plan;
     count_ = count;
     memory_.restart(filter_);

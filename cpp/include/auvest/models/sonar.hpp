@@ -11,6 +11,7 @@
 
 #include "auvest/math/angle.hpp"
 #include "auvest/math/trigonometry.hpp"
+#include "auvest/models/range_limits.hpp"
 #include "auvest/status.hpp"
 #include "auvest/types.hpp"
 
@@ -27,7 +28,7 @@ template <class Scalar_>
 struct Sonar {
   using Scalar = Scalar_;
 
-  struct Params {
+  struct Params : RangeLimits<Scalar> {
     Scalar sigma_range_m = Scalar(1);         ///< of dr, > 1e-6; section 7: 0.3 to 15
     Scalar sigma_bearing_rad = Scalar(0.06);  ///< of dtheta, > 1e-6; section 7: 0.015 to 0.4
     Bearing bearing = Bearing::kMasterToSlave;
@@ -93,8 +94,9 @@ struct Sonar {
   /// kBadParameter also where the bearing needs a heading that a pose of `pose_states` has not.
   Status check(int pose_states) const {
     const bool valid =
-        math::is_finite(params.sigma_range_m) && params.sigma_range_m > Scalar(1e-6) &&
-        math::is_finite(params.sigma_bearing_rad) && params.sigma_bearing_rad > Scalar(1e-6) &&
+        params.RangeLimits<Scalar>::valid() && math::is_finite(params.sigma_range_m) &&
+        params.sigma_range_m > Scalar(1e-6) && math::is_finite(params.sigma_bearing_rad) &&
+        params.sigma_bearing_rad > Scalar(1e-6) &&
         (params.bearing != Bearing::kFromHeading || pose_states > 2);
     return valid ? Status::kOk : Status::kBadParameter;
   }

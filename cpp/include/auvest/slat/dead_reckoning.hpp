@@ -34,7 +34,7 @@ class DeadReckoning : public SlatFilter<Motion_, 0> {
     if (motion_.check() != Status::kOk || !(longest_step_s_ > Scalar(0))) {
       return Status::kBadParameter;
     }
-    const Status status = check_slave(pose);
+    const Status status = check_start(pose);
     if (status != Status::kOk) return status;
     this->start(Frame::template noise_of_an_hour<true>(motion_, NoMaster()));
     pose_ = pose;
@@ -46,7 +46,7 @@ class DeadReckoning : public SlatFilter<Motion_, 0> {
 
   Status predict(Scalar dt, const Control& u, math::Random&, const VelocityChange* = nullptr) {
     const Status status =
-        this->check_prediction(dt, u, nullptr, longest_step_s_, Frame::extent_of(pose_));
+        this->check_prediction(*this, dt, u, nullptr, longest_step_s_, Frame::extent_of(pose_));
     if (status != Status::kOk) return status;
     motion_.propagate(motion_.step(u, dt), pose_);
     return Status::kOk;

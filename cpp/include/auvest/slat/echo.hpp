@@ -19,8 +19,8 @@ struct Echo {
   int master;
 };
 
-/// kOk if an update by `count` echoes of `masters` masters is possible: finite, each master at most
-/// once, no more echoes than masters.
+/// kOk if an update by `count` echoes of `masters` masters is possible: finite, of ranges that the
+/// sonar can measure, each master at most once, no more echoes than masters.
 template <class Scalar>
 inline Status check_echoes(const Echo<Scalar>* echoes, int count, int masters,
                            const Sonar<Scalar>& sonar, int pose_states) {
@@ -38,6 +38,8 @@ inline Status check_echoes(const Echo<Scalar>* echoes, int count, int masters,
       const Scalar z = echoes[s].z(k);
       if (z > Scalar(1e9) || z < Scalar(-1e9)) return Status::kOverflow;
     }
+    const Status admitted = sonar.params.admits(echoes[s].z(0));
+    if (admitted != Status::kOk) return admitted;
   }
   return Status::kOk;
 }

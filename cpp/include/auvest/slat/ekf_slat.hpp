@@ -52,7 +52,7 @@ class EkfSlat : public SlatFilter<Motion_, Masters, Safeguards_> {
   /// There is no master yet.
   Status reset(const SlaveBelief& pose, math::Random&) {
     if (model_.check() != Status::kOk || !params_.valid()) return Status::kBadParameter;
-    const Status status = check_slave(pose);
+    const Status status = check_start(pose);
     if (status != Status::kOk) return status;
     this->start(Frame::noise_of_an_hour(model_.motion, model_.master[0]));
     Model::start(pose, belief_);
@@ -71,8 +71,8 @@ class EkfSlat : public SlatFilter<Motion_, Masters, Safeguards_> {
 
   Status predict(Scalar dt, const Control& u, math::Random&,
                  const VelocityChange* changes = nullptr) {
-    const Status status =
-        this->check_prediction(dt, u, changes, params_.longest_step_s, Frame::extent_of(belief_));
+    const Status status = this->check_prediction(*this, dt, u, changes, params_.longest_step_s,
+                                                 Frame::extent_of(belief_));
     if (status != Status::kOk) return status;
     safeguards_.wait(dt, masters_);
     model_.predict(model_.motion.step(u, dt), dt, changes, masters_, belief_);

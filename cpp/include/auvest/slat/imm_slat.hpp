@@ -186,7 +186,7 @@ class EkfSlat<Motion_, Imm<Models...>, Masters, Safeguards_>
     if (motion_.check() != Status::kOk || master_.check() != Status::kOk || !params_.valid()) {
       return Status::kBadParameter;
     }
-    const Status status = check_slave(pose);
+    const Status status = check_start(pose);
     if (status != Status::kOk) return status;
     this->start(Frame::noise_of_an_hour(motion_, master_));
     Model::start(pose, belief_[0]);
@@ -219,7 +219,8 @@ class EkfSlat<Motion_, Imm<Models...>, Masters, Safeguards_>
                  const VelocityChange* changes = nullptr) {
     Extent<Scalar> extent;
     for (int h = 0; h < hypotheses_; ++h) Frame::extend(belief_[h], 0, extent);
-    const Status status = this->check_prediction(dt, u, changes, params_.longest_step_s, extent);
+    const Status status =
+        this->check_prediction(*this, dt, u, changes, params_.longest_step_s, extent);
     if (status != Status::kOk) return status;
     safeguards_.wait(dt, masters_);
     for (int n = 0; n < masters_; ++n) mix_models_of(n, master_.stay(dt));

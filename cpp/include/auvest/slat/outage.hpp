@@ -48,13 +48,11 @@ class Outage {
   Status share(const SlaveBelief& slave, const MasterBelief* masters, int count) {
     constexpr int kRoom = Filter::kMasters;
     if (count < 0 || count > Masters || (kRoom > 0 && count > kRoom)) return Status::kBadParameter;
-    const Status status = check_slave(slave);
+    const Status status = check_start(slave);
     if (status != Status::kOk) return status;
     for (int n = 0; n < count; ++n) {
-      if (!math::all_finite(masters[n].x) || !math::lower_finite(masters[n].P)) {
-        return Status::kNotFinite;
-      }
-      if (!math::is_positive_definite(masters[n].P)) return Status::kNotPositiveDefinite;
+      const Status sound = check_newcomer(masters[n]);
+      if (sound != Status::kOk) return sound;
     }
     slave_ = slave;
     count_ = count;

@@ -15,6 +15,7 @@
 
 #include "auvest/math/linear_algebra.hpp"
 #include "auvest/math/random.hpp"
+#include "auvest/math/resolution.hpp"
 #include "auvest/models/sonar.hpp"
 #include "auvest/particles/log_weights.hpp"
 #include "auvest/particles/particle_set.hpp"
@@ -59,6 +60,28 @@ Status check_slave(const Belief<Scalar, Pose>& pose) {
     }
   }
   return Status::kOk;
+}
+
+/// Whether the format is coarse at the belief's place, of slave or master, against its P.
+template <class Scalar, int N>
+AUVEST_OUTLINE bool is_far(const Belief<Scalar, N>& belief) {
+  return math::is_coarse(belief.x(0), belief.P(0, 0)) ||
+         math::is_coarse(belief.x(1), belief.P(1, 1));
+}
+
+/// The same, to start from: kFarFromOrigin where the format is coarse against P.
+template <class Scalar, int Pose>
+Status check_start(const Belief<Scalar, Pose>& pose) {
+  const Status status = check_slave(pose);
+  return status == Status::kOk && is_far(pose) ? Status::kFarFromOrigin : status;
+}
+
+/// A belief of a master that a filter does not have yet. Only the lower triangle of P is read.
+template <class Scalar>
+Status check_newcomer(const Belief<Scalar, 6>& master) {
+  if (!math::all_finite(master.x) || !math::lower_finite(master.P)) return Status::kNotFinite;
+  if (is_far(master)) return Status::kFarFromOrigin;
+  return math::is_positive_definite(master.P) ? Status::kOk : Status::kNotPositiveDefinite;
 }
 
 /// Masters: how many there may be. Safeguards_: see safeguards.hpp.
@@ -140,14 +163,19 @@ class SlatFilter {
   Status check_master(const MasterBelief& belief) const {
     if (!initialised_) return Status::kNotInitialised;
     if (masters_ == Masters) return Status::kBadParameter;
-    if (!math::all_finite(belief)) return Status::kNotFinite;
-    return math::is_positive_definite(belief.P) ? Status::kOk : Status::kNotPositiveDefinite;
+    return check_newcomer(belief);
   }
 
-  Status check_prediction(Scalar dt, const Control& u, const VelocityChange* changes,
-                          Scalar longest_step_s, const Extent<Scalar>& extent) const {
+  /// kFarFromOrigin where `self`, this filter, has drifted so far that its slave would stand still.
+  template <class Self>
+  Status check_prediction(const Self& self, Scalar dt, const Control& u,
+                          const VelocityChange* changes, Scalar longest_step_s,
+                          const Extent<Scalar>& extent) const {
     if (!initialised_) return Status::kNotInitialised;
-    return check_step(dt, u, changes, masters_, longest_step_s, extent, hourly_noise_);
+    const Status status =
+        check_step(dt, u, changes, masters_, longest_step_s, extent, hourly_noise_);
+    if (status != Status::kOk || !math::may_be_coarse(extent.square[0])) return status;
+    return is_far(self.slave()) ? Status::kFarFromOrigin : Status::kOk;
   }
 
   /// The largest number that an hour of noise puts into a covariance, for check_step(). Not worth

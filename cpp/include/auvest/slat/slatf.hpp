@@ -145,7 +145,7 @@ class Slatf : public SlatfFrame<
     if (!valid || motion_.check() != Status::kOk || master_.check() != Status::kOk) {
       return Status::kBadParameter;
     }
-    const Status status = check_slave(pose);
+    const Status status = check_start(pose);
     if (status != Status::kOk) return status;
     this->start(particles, Frame::noise_of_an_hour(motion_, master_));
     error_.restart();
@@ -198,7 +198,8 @@ class Slatf : public SlatfFrame<
   /// master; null: none. Takes one key of random numbers.
   Status predict(Scalar dt, const Control& u, math::Random& random,
                  const VelocityChange* changes = nullptr) {
-    const Status status = this->check_prediction(dt, u, changes, params_.longest_step_s, extent());
+    const Status status =
+        this->check_prediction(*this, dt, u, changes, params_.longest_step_s, extent());
     if (status != Status::kOk) return status;
     safeguards_.wait(dt, masters_);
     const Prediction prediction(motion_.step(u, dt), dt, changes, random);
@@ -248,7 +249,7 @@ class Slatf : public SlatfFrame<
   Status step(Scalar dt, const Control& u, const VelocityChange* changes,
               const Echo<Scalar>* echoes, int count, const Sonar<Scalar>& sonar,
               math::Random& random) {
-    Status status = this->check_prediction(dt, u, changes, params_.longest_step_s, extent());
+    Status status = this->check_prediction(*this, dt, u, changes, params_.longest_step_s, extent());
     if (status == Status::kOk) status = check(echoes, count, sonar);
     if (status != Status::kOk) return status;
     if (count == 0 || births() || remembers_silence()) {

@@ -98,7 +98,7 @@ class SlatfJoint : public SlatfJointFrame<Motion_, Masters, Resampling_, Safegua
     const bool valid = this->fits(particles) && Frame::is_share(params_.resample_below) &&
                        Frame::is_share(params_.kept) && params_.valid();
     if (!valid || model_.check() != Status::kOk) return Status::kBadParameter;
-    const Status status = check_slave(pose);
+    const Status status = check_start(pose);
     if (status != Status::kOk) return status;
     this->start(particles, Frame::noise_of_an_hour(model_.motion, model_.master[0]));
     Joint joint;
@@ -131,7 +131,8 @@ class SlatfJoint : public SlatfJointFrame<Motion_, Masters, Resampling_, Safegua
   /// master; null: none. Takes no random numbers.
   Status predict(Scalar dt, const Control& u, math::Random&,
                  const VelocityChange* changes = nullptr) {
-    const Status status = this->check_prediction(dt, u, changes, params_.longest_step_s, extent());
+    const Status status =
+        this->check_prediction(*this, dt, u, changes, params_.longest_step_s, extent());
     if (status != Status::kOk) return status;
     safeguards_.wait(dt, masters_);
     const typename Motion::Step move = model_.motion.step(u, dt);
@@ -167,7 +168,7 @@ class SlatfJoint : public SlatfJointFrame<Motion_, Masters, Resampling_, Safegua
   Status step(Scalar dt, const Control& u, const VelocityChange* changes,
               const Echo<Scalar>* echoes, int count, const Sonar<Scalar>& sonar,
               math::Random& random) {
-    Status status = this->check_prediction(dt, u, changes, params_.longest_step_s, extent());
+    Status status = this->check_prediction(*this, dt, u, changes, params_.longest_step_s, extent());
     if (status == Status::kOk) status = this->check_update(echoes, count, masters_, sonar);
     if (status != Status::kOk) return status;
     if (count == 0) return predict(dt, u, random, changes);

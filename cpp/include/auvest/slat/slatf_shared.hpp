@@ -99,7 +99,7 @@ class SlatfShared : public SlatfSharedFrame<Motion_, Masters, Resampling_, Safeg
     const bool valid = this->fits(particles) && Frame::is_share(params_.resample_below) &&
                        Frame::is_share(params_.kept) && params_.valid();
     if (!valid || model_.check() != Status::kOk) return Status::kBadParameter;
-    const Status status = check_slave(pose);
+    const Status status = check_start(pose);
     if (status != Status::kOk) return status;
     this->start(particles, Frame::noise_of_an_hour(model_.motion, model_.master[0]));
     Model::start(pose, centre_);
@@ -129,8 +129,8 @@ class SlatfShared : public SlatfSharedFrame<Motion_, Masters, Resampling_, Safeg
   /// master; null: none. Takes no random numbers.
   Status predict(Scalar dt, const Control& u, math::Random&,
                  const VelocityChange* changes = nullptr) {
-    const Status status =
-        this->check_prediction(dt, u, changes, params_.longest_step_s, Frame::extent_of(centre_));
+    const Status status = this->check_prediction(*this, dt, u, changes, params_.longest_step_s,
+                                                 Frame::extent_of(centre_));
     if (status != Status::kOk) return status;
     safeguards_.wait(dt, masters_);
     const typename Motion::Step move = model_.motion.step(u, dt);
