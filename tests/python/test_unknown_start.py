@@ -348,6 +348,7 @@ def trial(folder, stations=STATIONS, turn=150.0, end=300.0):
         source=np.arange(len(stations)), x_m=stations[:, 0], y_m=stations[:, 1],
     )  # fmt: skip
     write_file(folder, "start.csv", time_s=[0.0], x_m=[0.0], y_m=[0.0], heading_rad=[0.0])
+    write_file(folder, "truth.csv", time_s=time_s, x_m=truth[:, 0], y_m=truth[:, 1])
     write_file(folder, "ranges.csv", time_s=5.0 * k, source=source, range_m=ranges)
     return LogFolder(folder), truth
 
@@ -369,6 +370,12 @@ def test_a_replay_finds_its_start_and_says_when(tmp_path):
     assert result.health.verdict == "sound", result.findings
     assert result.numbers["convergence"] == "settled"
     assert 25.0 < result.numbers["settled_s"] < 100.0  # six ranges, after the first that tell
+    errors = result.errors.columns()  # all of them: they are few
+    since = errors["time_s"] >= result.numbers["settled_s"]
+    square = errors["error_x_m"][since] ** 2 + errors["error_y_m"][since] ** 2
+    assert result.numbers["settled_rmse_m"] == pytest.approx(np.sqrt(square.mean()), rel=1e-12)
+    assert result.numbers["settled_rmse_m"] < 1.0
+    assert result.numbers["rmse_m"] > 10.0
     said = dict(rows(result))
     assert said["start"].startswith("settled first at ")
     header, *lines = (tmp_path / "estimates.csv").read_text().splitlines()
