@@ -124,6 +124,24 @@ def test_moments_of_the_mixture_are_the_belief():
     assert f.mixture.x.any()
 
 
+def test_dead_reckoning_moves_all_components_alike():
+    """To the bit: one addition of the displacement and of Q, to each and to the moments."""
+    f = lost()
+    _, rows_ = voyage(4)
+    f.run(**rows_)
+    before, x, P = f.mixture, f.x, f.P
+    assert len(before) > 1
+    given = [1.0, 0.2, 0.7]
+    moved = f.process.f([0.0, 0.0], 5.0, given)
+    noise = f.process.Q(5.0, given)
+    f.predict(5.0, given)
+    assert same_bits(f.mixture.weight, before.weight)
+    assert same_bits(f.mixture.x, before.x + moved)
+    assert same_bits(f.mixture.P, before.P + noise)
+    assert same_bits(f.x, x + moved)
+    assert same_bits(f.P, P + noise)
+
+
 @pytest.mark.parametrize("late_s", [0.0, 12.0])
 @pytest.mark.parametrize("dtype", DTYPES)
 @pytest.mark.parametrize("kind", KINDS)
@@ -159,6 +177,7 @@ def test_goes_on_with_the_same_bits(dtype, late_s):
         other.run(**{name: v if np.ndim(v) == 0 else v[:3] for name, v in rows_.items()})
         other.restore(f.save())
         twins = [other, pickle.loads(pickle.dumps(f)), copy.deepcopy(f)]
+        assert [told(twin) for twin in twins] == [told(f)] * 3
         for g in (f, *twins):
             g.predict(5.0, rows_["input"][k])
             age = 5.0 if late_s and k % 3 == 2 else 0.0
