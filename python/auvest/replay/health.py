@@ -150,7 +150,7 @@ class Residuals:
         self.ranges = 0
         self.lost = 0  # ranges until the first that told where the craft is
         self.convergence = ""
-        self.settled_s = math.nan
+        self.settled_s = math.inf
         self._samples = Samples(COLUMNS, KEPT)
         self._beginning: list[Columns] = []
 
@@ -179,9 +179,7 @@ class Residuals:
         said = batch.estimates.get("convergence", np.empty(0, "U1"))
         if len(said):
             self.convergence = str(said[-1])
-            settled = np.flatnonzero(said == tables.SETTLED)
-            if len(settled) and math.isnan(self.settled_s):
-                self.settled_s = float(batch.estimates["time_s"][settled[0]])
+            self.settled_s = min(self.settled_s, tables.settled_s(batch.estimates))
 
     def rows(self) -> Columns:
         """Give those that were compared with a prediction."""
@@ -345,7 +343,7 @@ def start_findings(residuals: Residuals) -> list[Finding]:
     if not said or said == tables.SETTLED:
         return []
     since = "it never settled"
-    if not math.isnan(residuals.settled_s):
+    if math.isfinite(residuals.settled_s):
         since = f"it settled first at {residuals.settled_s:.6g} s"
     texts = {
         tables.NOT_CONVERGED: "at the end the ranges do not say where the craft is",

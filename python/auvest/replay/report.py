@@ -87,6 +87,7 @@ def rows(result: Result) -> list[tuple[str, str]]:
         ("late lines put in order", f"{sum(f['reordered'] for f in n['late'].values())}"),
         ("late lines not used", f"{sum(f['dropped'] for f in n['late'].values())}"),
         ("position RMSE", _metres(n["rmse_m"])),
+        ("position RMSE since settled", _metres(n.get("settled_rmse_m"))),
         ("largest error", _metres(n["max_error_m"])),
         ("dead reckoning alone, RMSE", _metres(n["dead_reckoned_rmse_m"])),
         ("truth within 3 sigma", _share(n["inside_3_sigma"])),

@@ -38,7 +38,8 @@ class Result:
         The filter.
     numbers : dict
         The figures of the run, see :class:`auvest.replay.tally.Tally`, and ``late``; of a filter
-        with several components ``convergence``, at the end, and ``settled_s``, when first.
+        with several components ``convergence``, at the end, ``settled_s``, when first, and
+        ``settled_rmse_m``, from then on.
     estimates, measurements, errors, outliers : Samples
         At most a few thousand rows of each table, for figures; ``outliers`` are measurements with
         less than full weight.
@@ -154,7 +155,8 @@ def replay(
     if residuals.convergence:
         settled_s = residuals.settled_s
         numbers["convergence"] = residuals.convergence
-        numbers["settled_s"] = None if math.isnan(settled_s) else settled_s
+        numbers["settled_s"] = settled_s if math.isfinite(settled_s) else None
+        numbers["settled_rmse_m"] = tally.settled_rmse_m()
     numbers["late"] = {name: asdict(stream.late) for name, stream in engine.streams.items()}
     return Result(
         name=log.path.resolve().name,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
@@ -66,6 +67,14 @@ def moved(batch: Batch, origin: tuple[float, float]) -> Batch:
         }
 
     return replace(batch, estimates=shift(batch.estimates), errors=shift(batch.errors))
+
+
+def settled_s(estimates: Columns) -> float:
+    """Time of the first estimate that is settled; infinity if none is."""
+    if "convergence" not in estimates:
+        return math.inf
+    settled = np.flatnonzero(estimates["convergence"] == SETTLED)
+    return float(estimates["time_s"][settled[0]]) if len(settled) else math.inf
 
 
 def blank_measurements(rows: int) -> dict[str, npt.NDArray[Any]]:

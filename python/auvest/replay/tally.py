@@ -24,6 +24,9 @@ class Tally:
         self.last_s = math.nan
         self._truth = 0
         self._square = 0.0
+        self._settled_s = math.inf
+        self._settled = 0
+        self._settled_square = 0.0
         self._reckoned_square = 0.0
         self._worst = 0.0
         self._inside = 0
@@ -60,6 +63,10 @@ class Tally:
         square = x * x + y * y
         self._truth += len(x)
         self._square += float(square.sum())
+        self._settled_s = min(self._settled_s, tables.settled_s(batch.estimates))
+        since = errors["time_s"] >= self._settled_s
+        self._settled += int(since.sum())
+        self._settled_square += float(square[since].sum())
         self._worst = max(self._worst, math.sqrt(float(square.max(initial=0.0))))
         self._reckoned_square += float(np.square(errors["dead_reckoned_error_m"]).sum())
         inside = (np.abs(x) <= 3 * errors["sigma_x_m"]) & (np.abs(y) <= 3 * errors["sigma_y_m"])
@@ -85,6 +92,10 @@ class Tally:
             "nis_mean": self._nis / self._nis_count if self._nis_count else None,
             "nis_bounds_95": list(bounds),
         }
+
+    def settled_rmse_m(self) -> float | None:
+        """RMSE since the filter settled first; None if it never did, or without a truth."""
+        return self._root(self._settled_square, self._settled)
 
     @staticmethod
     def _root(square: float, count: int) -> float | None:
