@@ -5,6 +5,7 @@
 #include <cstring>
 #include <memory>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "auvest/math/random.hpp"
@@ -12,6 +13,7 @@
 #include "auvest/slat/echo.hpp"
 #include "auvest/slat/ekf_slat.hpp"
 #include "auvest/slat/imm_slat.hpp"
+#include "auvest/slat/outage.hpp"
 #include "slat_interface.hpp"
 #include "slat_state.hpp"
 
@@ -99,6 +101,24 @@ class AnySlat {
   }
 
   std::unique_ptr<Interface> filter_;
+};
+
+/// The outage switch of such a filter. A first prediction that is refused has begun to start the
+/// filter, which nobody sees but who saves it: here it is as it was.
+template <class Any>
+class AnyOutage : public Outage<Any, Any::kMasters> {
+ public:
+  using Base = Outage<Any, Any::kMasters>;
+  using Base::Base;
+
+  Status predict(typename Any::Scalar dt, const typename Any::Control& u, math::Random& random,
+                 const typename Any::VelocityChange* changes = nullptr) {
+    if (this->mode() != Communication::kUp) return Base::predict(dt, u, random, changes);
+    AnyOutage started(*this);
+    const Status status = started.Base::predict(dt, u, random, changes);
+    if (status == Status::kOk) *this = std::move(started);
+    return status;
+  }
 };
 
 /// An object of auvest's whose bytes come from code that may have another name for its type.

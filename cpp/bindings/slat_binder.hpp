@@ -10,7 +10,6 @@
 
 #include "any_slat.hpp"
 #include "auvest/records/run.hpp"
-#include "auvest/slat/outage.hpp"
 #include "binders.hpp"
 #include "plain.hpp"
 #include "simulation/slat.hpp"
@@ -31,7 +30,7 @@ class SlatBinder {
   using Scalar = typename Motion::Scalar;
   static constexpr int kPose = Motion::kStates;
   using Any = AnySlat<Scalar, kPose>;
-  using Switch = Outage<Any, Any::kMasters>;
+  using Switch = AnyOutage<Any>;
   using Master = PiecewiseAcceleration<Scalar>;
   using Echo = auvest::Echo<Scalar>;
   using Change = typename Any::VelocityChange;

@@ -23,7 +23,7 @@ namespace desk {
 template <class Scalar>
 struct FilterOptions {
   using Linearisation = AnyLinearisation<Scalar>;
-  using Rule = RobustUpdate<AnyKernel<Scalar>, AnyRecovery<Scalar>>;
+  using Rule = RuntimeRule<Scalar>;
 
   typename Linearisation::Kind kind = Linearisation::Kind::kEkf;
   typename SigmaPoints<Scalar>::Params points;

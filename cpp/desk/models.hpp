@@ -19,6 +19,7 @@
 #include "auvest/runtime/any_kernel.hpp"
 #include "auvest/runtime/any_linearisation.hpp"
 #include "auvest/runtime/any_recovery.hpp"
+#include "auvest/slat/definite.hpp"
 #include "desk/members.hpp"
 #include "desk/report.hpp"
 
@@ -83,6 +84,26 @@ struct RuntimeProcess {
   bool translates() const { return model->translates; }
 };
 
+/// After a step of `Filter` from the belief `before`: what restore() does not take has its lost
+/// pivots raised to what the format resolves. Those are of a covariance that rounding has left
+/// indefinite or with a variance of 0, in single precision by a measurement that is 1e7 times as
+/// precise as what it corrects. False where that is none either: not finite. No bit of a belief
+/// that restore() takes changes, nor of one so small that what is lost is subnormal.
+template <class Filter>
+bool keep_belief(const typename Filter::BeliefType& before, typename Filter::BeliefType& belief) {
+  using Scalar = typename Filter::Scalar;
+  if (Filter::check_belief(belief) == Status::kOk) return true;
+  typename Filter::Covariance raised = belief.P;
+  for (int i = 0; i < Filter::kStates; ++i) {
+    const Scalar floor = math::pivot_floor(before.P(i, i));
+    if (floor < (std::numeric_limits<Scalar>::min)()) return true;
+    raised(i, i) = math::larger(raised(i, i), floor);
+  }
+  belief.P = raised;
+  raise_pivots(belief.P);
+  return Filter::check_belief(belief) == Status::kOk;
+}
+
 /// A Gaussian filter whose process and whose linearisation are chosen at run time.
 template <class Scalar_, int N>
 class RuntimeGaussian
@@ -96,7 +117,10 @@ class RuntimeGaussian
       : Base(process, how.check()), how_(how) {}
 
   Status predict_belief(BeliefType& belief, Scalar dt) const {
-    return this->process().model->predict(how_, belief, dt, this->process().input);
+    const BeliefType before = belief;
+    const Status status = this->process().model->predict(how_, belief, dt, this->process().input);
+    if (status != Status::kOk) return status;
+    return keep_belief<RuntimeGaussian>(before, belief) ? Status::kOk : Status::kOverflow;
   }
 
   template <class Model, class Point>
@@ -144,9 +168,28 @@ struct ComponentSequences {
   }
 };
 
+/// The robust update with any kernel and recovery; its belief is one that restore() takes.
+template <class Scalar>
+struct RuntimeRule : RobustUpdate<AnyKernel<Scalar>, AnyRecovery<Scalar>> {
+  using Base = RobustUpdate<AnyKernel<Scalar>, AnyRecovery<Scalar>>;
+  using Base::Base;
+
+  template <int N, class... Arguments>
+  Status operator()(Belief<Scalar, N>& belief, Arguments&&... arguments) {
+    const Belief<Scalar, N> before = belief;
+    const Base rule = *this;
+    const Status status = Base::operator()(belief, std::forward<Arguments>(arguments)...);
+    if (status != Status::kOk || keep_belief<RuntimeGaussian<Scalar, N>>(before, belief)) {
+      return status;
+    }
+    belief = before;
+    static_cast<Base&>(*this) = rule;
+    return Status::kOverflow;
+  }
+};
+
 template <class Scalar, int N>
-using RuntimeInside =
-    Robust<RuntimeGaussian<Scalar, N>, RobustUpdate<AnyKernel<Scalar>, AnyRecovery<Scalar>>>;
+using RuntimeInside = Robust<RuntimeGaussian<Scalar, N>, RuntimeRule<Scalar>>;
 
 /// A Gaussian sum, of one component where nothing else is asked for; one state is no position.
 template <class Scalar, int N>

@@ -22,7 +22,7 @@ import json
 import math
 import struct
 import zlib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any, TypeAlias
 
@@ -97,7 +97,10 @@ def unpack(state: object, kind: str, description: Description) -> dict[str, npt.
 
 
 def require(
-    arrays: Mapping[str, npt.NDArray[Any]], dtypes: Mapping[str, npt.DTypeLike], optional: str = ""
+    arrays: Mapping[str, npt.NDArray[Any]],
+    dtypes: Mapping[str, npt.DTypeLike],
+    optional: str = "",
+    single: Collection[str] = (),
 ) -> None:
     """Refuse arrays that are not those of a state.
 
@@ -109,11 +112,14 @@ def require(
         What there must be. Floats must be finite.
     optional : str
         How the names begin of arrays that may be there as well: all of them or none.
+    single : collection of str
+        Names of those that are one number; the others have rows.
 
     Raises
     ------
     ValueError
-        If one is missing, of another type, or not finite, or there is one too many.
+        If one is missing, of another type, or not finite, one number instead of rows or rows
+        instead of one number, or there is one too many.
     """
     wanted = dict(dtypes)
     if optional and not any(name.startswith(optional) for name in arrays):
@@ -127,6 +133,8 @@ def require(
                 f"state is damaged: {name} is of {array.dtype.name}, "
                 f"expected {np.dtype(dtypes[name]).name}"
             )
+        if (array.ndim == 0) != (name in single):
+            raise ValueError(f"state is damaged: {name} has the shape {array.shape}")
         if array.dtype.kind == "f" and not np.isfinite(array).all():
             raise ValueError(f"state is damaged: {name} has a number that is not finite")
 

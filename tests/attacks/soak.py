@@ -12,6 +12,8 @@ finite, a covariance indefinite, or the memory grows.
 from __future__ import annotations
 
 import argparse
+import contextlib
+import ctypes
 import gc
 import sys
 import time
@@ -50,7 +52,11 @@ class Found:
 
 
 def memory_mb() -> float:
+    """Resident memory, without what the allocator keeps: that grows by how results lie in it."""
     gc.collect()
+    if sys.platform == "linux":
+        with contextlib.suppress(AttributeError):  # of musl, which keeps less
+            ctypes.CDLL(None).malloc_trim(0)
     return int(Path("/proc/self/statm").read_text().split()[1]) * 4096 / 1e6
 
 
@@ -157,25 +163,31 @@ def smallest_correlation(p: Floats) -> float:
     return float(np.linalg.eigvalsh(correlations).min())
 
 
+def compare(single: Any, double: Any, truth: Floats, found: Found) -> None:
+    """Count what one chunk of the filter and of its twin shows."""
+    found.not_finite += int((~np.isfinite(single.x)).any(axis=1).sum())
+    found.smallest = min(found.smallest, smallest_correlation(single.P[::10]))
+    apart = np.hypot(*(single.x[:, :2].astype(float) - double.x[:, :2]).T)
+    worst = int(np.argmax(apart))
+    if apart[worst] > found.apart_m:
+        found.apart_m = float(apart[worst])
+        found.worst = f"step {found.steps + worst + 1}"
+    if hasattr(single, "weight"):
+        a, b = single.weight, double.weight
+        found.otherwise += int(((a == 0) != (b == 0)).any(axis=1).sum())
+    for k, result in enumerate((single, double)):
+        found.squares[k] += float(((result.x[:, :2] - truth) ** 2).sum())
+
+
 def soak(make: Callable[[str], Any], steps: int, limit_s: float) -> Found:
     """Run a filter and its twin for so many steps, or for so long."""
     filters = [make("float32"), make("float64")]
     found, began = Found(), time.monotonic()
     while found.steps < steps and time.monotonic() - began < limit_s:
-        (single, double), truth = chunk(filters, found.steps)
-        found.not_finite += int((~np.isfinite(single.x)).any(axis=1).sum())
-        found.smallest = min(found.smallest, smallest_correlation(single.P[::10]))
-        apart = np.hypot(*(single.x[:, :2].astype(float) - double.x[:, :2]).T)
-        worst = int(np.argmax(apart))
-        if apart[worst] > found.apart_m:
-            found.apart_m = float(apart[worst])
-            found.worst = f"step {found.steps + worst + 1}"
-        if hasattr(single, "weight"):
-            a, b = single.weight, double.weight
-            found.otherwise += int(((a == 0) != (b == 0)).any(axis=1).sum())
-        for k, result in enumerate((single, double)):
-            found.squares[k] += float(((result.x[:, :2] - truth) ** 2).sum())
+        results, truth = chunk(filters, found.steps)
+        compare(*results, truth, found)
         found.steps += CHUNK
+        del results, truth  # what is measured is what the filters keep
         now = memory_mb()
         begun = now if found.steps <= _WARM_UP * CHUNK else found.memory_mb[0]
         found.memory_mb = (begun, now)

@@ -440,5 +440,6 @@ def all_records() -> list[Record]:
             records.append(intervals(kind, process))
         records += [on_the_station(kind), refusals(kind), dying(kind)]
         records += [scaled(kind, scale) for scale in (1e-30, 1e-17, 1e-9, 1e9, 1e15, 1e18)]
-        records += [random_bits(kind, seed) for seed in (1, 2)]
+        # Of others a covariance is lost in the format: Python keeps one, see desk/models.hpp.
+        records += [random_bits(kind, seed) for seed in (2, 4)]
     return [*records, long_record()]

@@ -10,6 +10,7 @@ import pytest
 from filter_support import DTYPES, PAPER, everything, make, measure, same_bits, straight
 
 import auvest
+from auvest import _state
 
 LAWS = (
     None,
@@ -129,6 +130,18 @@ def test_status_survives_a_pickle_and_an_error_does_too():
     assert str(error) == str(caught.value)
     assert (error.step, error.status) == (1, auvest.Status.overflow)
     assert same_bits(error.partial.P, caught.value.partial.P)
+
+
+def test_one_number_in_place_of_rows_is_refused_by_name():
+    f = make(auvest.Ukf)
+    before, description = f.save(), f._description()
+    arrays = _state.unpack(before, "Ukf", description)
+    for name, array in arrays.items():
+        shape = (1,) if array.ndim == 0 else ()
+        other = {**arrays, name: np.zeros(shape, array.dtype)}
+        with pytest.raises(ValueError, match=f"^state is damaged: {name} has the shape"):
+            f.restore(_state.pack("Ukf", description, other))
+        assert f.save() == before
 
 
 FOREIGN = {

@@ -16,10 +16,12 @@ from auvest import Convergence, FilterError, _state
 from auvest.logs import LogFolder
 from auvest.logs.findings import finding
 from auvest.logs.write import write_file
-from auvest.replay import checks, read_settings
+from auvest.replay import checks, read_settings, tables
 from auvest.replay.config import settings_from
+from auvest.replay.health import Residuals, start_findings
 from auvest.replay.report import html, rows, warnings
 from auvest.replay.run import replay
+from auvest.replay.tables import Batch
 from auvest.simulation import cooperative
 
 STATIONS = np.array([[0.0, 0.0], [120.0, 0.0], [60.0, 90.0]])
@@ -413,12 +415,30 @@ def test_one_gaussian_that_no_range_places_is_not_trusted(tmp_path):
     assert result.findings == [
         finding(
             "not_converged",
-            "no range told where the craft is: a start that is not known needs components in "
-            "[filter], 16 or 32",
+            "the first 59 of 59 ranges did not tell where the craft is: a start that is not known "
+            "needs components in [filter], 16 or 32",
         )
     ]
     known = replace(unknown(1), start=replace(unknown(1).start, sigma_position_m=30.0))
     assert "not_converged" not in {one.cause for one in replay(log, known, causes=False).findings}
+
+
+@pytest.mark.parametrize(
+    ("lost_ranges", "ranges", "verdict"),
+    [(0, 50, None), (12, 20, None), (13, 1000, "doubtful"), (51, 1000, "not_trusted"),
+     (3, 3, "not_trusted")],
+)  # fmt: skip
+def test_how_long_one_gaussian_may_be_lost(lost_ranges, ranges, verdict):
+    """Counted over the batches of a replay; one range later that says less is no lost start."""
+    told = np.arange(ranges) >= lost_ranges
+    if ranges > lost_ranges + 2:
+        told[-1] = False
+    residuals = Residuals()
+    for part in np.array_split(told, 3):
+        measured = tables.blank_measurements(len(part))
+        nothing = dict.fromkeys((*tables.ESTIMATES, *tables.ERRORS), np.empty(0))
+        residuals.add(Batch(nothing, measured, nothing, np.full(len(part), 50.0), part))
+    assert [one.verdict for one in start_findings(residuals)] == [verdict] * (verdict is not None)
 
 
 def test_settings_that_are_for_ranges_are_refused_for_fixes(tmp_path):

@@ -694,8 +694,8 @@ class GaussianFilter:
             parameters and precision. The filter is then unchanged.
         """
         arrays = unpack(state, type(self).__name__, self._description())
-        require(arrays, self._saved_dtypes(), optional="report_")
-        if arrays["status"].shape != () or int(arrays["status"]) not in _STATUSES:
+        require(arrays, self._saved_dtypes(), optional="report_", single=("status", "report_nis"))
+        if int(arrays["status"]) not in _STATUSES:
             raise ValueError("state is damaged: there is no such status")
         status = Status(int(arrays.pop("status")))
         self._require_interval(arrays["policy"])

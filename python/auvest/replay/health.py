@@ -38,6 +38,8 @@ NIS_DOUBTFUL = 1.9
 #: Recoveries from lock-out, at least so many and at least in this share of the measurements; the
 #: recovery itself does no more, in the long run, than one in fifty.
 RECOVERIES_DOUBTFUL, RECOVERIES_NOT_TRUSTED, RECOVERY_SHARE = 2, 8, 0.01
+#: Share of the ranges of one Gaussian until the first that told where the craft is.
+LOST_NOT_TRUSTED = 0.05
 #: Share of a source beyond three sigma that makes it stand apart from the others, and how many
 #: times more it is than theirs.
 SOURCE_OFF, SOURCE_TIMES = 0.45, 3.0
@@ -146,7 +148,7 @@ class Residuals:
         self.unused: Counter[tuple[int, str]] = Counter()  # by source and outcome
         self.lines: Counter[int] = Counter()  # by source
         self.ranges = 0
-        self.located = 0
+        self.lost = 0  # ranges until the first that told where the craft is
         self.convergence = ""
         self.settled_s = math.nan
         self._samples = Samples(COLUMNS, KEPT)
@@ -170,8 +172,10 @@ class Residuals:
             self._beginning += [
                 {name: rows[name][k : k + 1] for name in COLUMNS} for k in compared[:FEW].tolist()
             ]
+        told = np.flatnonzero(batch.located)
+        if self.lost == self.ranges:
+            self.lost += int(told[0]) if len(told) else len(batch.located)
         self.ranges += len(batch.located)
-        self.located += int(batch.located.sum())
         said = batch.estimates.get("convergence", np.empty(0, "U1"))
         if len(said):
             self.convergence = str(said[-1])
@@ -330,12 +334,14 @@ def _apart(rows: Columns, within: npt.NDArray[np.bool_]) -> list[Finding]:
 def start_findings(residuals: Residuals) -> list[Finding]:
     """Say whether the ranges told where the craft is."""
     said = residuals.convergence
-    if not said and residuals.ranges > 0 and residuals.located == 0:
+    lost, ranges = residuals.lost, residuals.ranges
+    if not said and lost > 0 and (lost == ranges or lost > FEW):
         message = (
-            "no range told where the craft is: a start that is not known needs components in "
-            "[filter], 16 or 32"
+            f"the first {lost} of {ranges} ranges did not tell where the craft is: a start that is "
+            "not known needs components in [filter], 16 or 32"
         )
-        return [finding("not_converged", message)]
+        bad = lost > LOST_NOT_TRUSTED * ranges
+        return [finding("not_converged", message, verdict="not_trusted" if bad else "doubtful")]
     if not said or said == tables.SETTLED:
         return []
     since = "it never settled"

@@ -378,7 +378,8 @@ class Steps:
         What counts is how far the noise of the speed lets the slave go in a second.
         """
         is_coarse = getattr(_core, f"is_coarse_{self._dtype.name}")
-        way = self._motion.sigma_speed_m_s**2
+        sigma = self._motion.sigma_speed_m_s
+        way = min(sigma * sigma, float(np.finfo(self._dtype).max))
         if any(is_coarse(float(place), way) for place in pose[:2]):
             raise ValueError(far_from_origin(name, pose[:2], self._dtype))
 

@@ -570,13 +570,29 @@ TEST_CASE("EKF-SLAT with an Imm: the NIS is the mean over the hypotheses before 
   }
 }
 
+/// Puts a state of all hypotheses of a filter far away, through its visit_state().
+template <class Joint>
+struct PutFar {
+  int state;
+
+  void operator()(Joint& joint) const { joint.x(state) = 1e25f; }
+  template <class Other>
+  void operator()(Other&) const {}
+  template <class Count>
+  void count(Count&) const {}
+  template <class Count>
+  void count(Count&, Count) const {}
+};
+
 TEST_CASE("EKF-SLAT with an Imm: an echo that overflows in all hypotheses is refused") {
   using Filter = OpenEkf<Unicycle<float>, Three<float>, 2>;
   Filter filter(Unicycle<float>(), three_models<float>(0.1));
   Random random(43);
   REQUIRE(filter.reset(slave_belief<float>(0.01), random) == Status::kOk);
   REQUIRE(filter.add_master(master_belief<float>(60, 80)) == Status::kOk);
-  REQUIRE(filter.add_master(master_belief<float>(1e25, 0)) == Status::kOk);  // its range overflows
+  REQUIRE(filter.add_master(master_belief<float>(90, 0)) == Status::kOk);
+  PutFar<Filter::BeliefType> far = {Filter::Model::first_of(1)};  // its range overflows
+  Filter::visit_state(static_cast<Filter&>(filter), far);
   const auto sonar = sonar_from_heading<float>();
   Echo<float> seen[2];
   seen[0].master = 0;

@@ -4,8 +4,10 @@
 
 #include "close.hpp"
 
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <cmath>
+#include <random>
 #include <utility>
 
 #include "auvest/models/piecewise_acceleration.hpp"
@@ -168,3 +170,40 @@ TEST_CASE("echo: a heading that it moves across the cut comes back on the other 
 }
 
 }  // namespace
+
+TEST_CASE(
+    "echo: a slave that is known only across a line leaves a covariance in single precision") {
+  using Model =
+      auvest::JointGaussian<auvest::CompassMotion<float>, auvest::PiecewiseAcceleration<float>, 1>;
+  const double scale[6] = {1, 1, 0.1, 0.1, 0.03, 0.03};
+  for (unsigned seed = 0; seed < 100; ++seed) {
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal;
+    // 770 m along the line, 0.3 m across, which the master's states know of.
+    const double way = 3 * normal(random);
+    Eigen::Matrix<double, 8, 8> root = Eigen::Matrix<double, 8, 8>::Zero();
+    root.col(0) << 770 * std::cos(way), 770 * std::sin(way), 0, 0, 0, 0, 0, 0;
+    root.col(1) << -0.3 * std::sin(way), 0.3 * std::cos(way), 0, 0, 0, 0, 0, 0;
+    for (int i = 0; i < 6; ++i) {
+      root(2 + i, 1) = 0.3 * scale[i] * normal(random);
+      for (int k = 0; k < i; ++k) root(2 + i, 2 + k) = scale[i] * normal(random);
+      root(2 + i, 2 + i) = scale[i];
+    }
+    const Eigen::Matrix<double, 8, 8> p = root * root.transpose();
+    Model::Joint joint;
+    joint.x << 0, 0, 60, 30, 0, 0, 0, 0;
+    joint.P = p.cast<float>();
+    for (int k = 0; k < 10; ++k) {
+      Vector<float, 2> z(float(67 + 30 * normal(random)), float(normal(random)));
+      auvest::Score<float> score;
+      REQUIRE(Model::correct(z, 0, auvest::Sonar<float>(), 13.8f, joint, score));
+      Eigen::Matrix<double, 8, 8> after = joint.P.cast<double>();
+      for (int i = 0; i < 8; ++i) REQUIRE(after(i, i) > 0);
+      const Eigen::Matrix<double, 8, 1> sigma = after.diagonal().array().sqrt();
+      after = (after.array() / (sigma * sigma.transpose()).array()).matrix();
+      after.diagonal().array() += 16 * 1.2e-7;  // eight states, each rounded
+      CHECK(Eigen::LLT<Eigen::Matrix<double, 8, 8>>(after).info() == Eigen::Success);
+    }
+  }
+}

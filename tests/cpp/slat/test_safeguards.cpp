@@ -266,11 +266,21 @@ void check_far_places() {
   CHECK(filter.reset(pose_at(kNorthing, 0.1f), one.random) == Status::kFarFromOrigin);
   CHECK(filter.masters() == 1);
   CHECK(filter.reset(pose_at(kNorthing, 10), one.random) == Status::kOk);
+  CHECK(filter.reset(pose_at(1e6f, 1e19f), one.random) == Status::kOverflow);
   CHECK(filter.reset(pose_at(4000, 0), one.random) == Status::kOk);
   auto master = master_belief<float>(double(kNorthing), 0, 0, 0, 0.1);
   CHECK(filter.add_master(master) == Status::kFarFromOrigin);
   CHECK(filter.masters() == 0);
   master.x(0) = 4000;
+  for (const int i : {2, 5}) {  // as large as the mean of several models cannot be formed
+    auto large = master;
+    large.x(i) = -3e38f;
+    CHECK(filter.add_master(large) == Status::kOverflow);
+    large = master;
+    large.P(i, i) = 3e38f;
+    CHECK(filter.add_master(large) == Status::kOverflow);
+  }
+  CHECK(filter.masters() == 0);
   CHECK(filter.add_master(master) == Status::kOk);
 }
 
@@ -290,7 +300,7 @@ void check_drift(Filter& filter, Random& random) {
   CHECK(filter.slave().x(0) == gone);
 }
 
-TEST_CASE("SLAT: starts and masters so far that the format is coarse are refused") {
+TEST_CASE("SLAT: starts and masters that are too far or too large are refused") {
   check_far_places<Ekf>();
   check_far_places<ImmEkf>();
   check_far_places<First>();

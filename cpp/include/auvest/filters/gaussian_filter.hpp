@@ -57,15 +57,20 @@ class GaussianFilter {
     return Status::kOk;
   }
 
-  /// Takes back a belief saved from belief(): the same bits go on.
-  Status restore(const BeliefType& saved) {
-    if (check() != Status::kOk) return check();
+  /// What restore() says of a belief: finite, and P positive definite but for rounding.
+  static Status check_belief(const BeliefType& saved) {
     if (!math::all_finite(saved)) return Status::kNotFinite;
     Covariance p = saved.P;
     // A pivot that is not a number makes those after it so.
-    if (!math::ldlt(p) || !math::is_finite(p(kStates - 1, kStates - 1))) {
-      return Status::kNotPositiveDefinite;
-    }
+    const bool definite = math::ldlt(p) && math::is_finite(p(kStates - 1, kStates - 1));
+    return definite ? Status::kOk : Status::kNotPositiveDefinite;
+  }
+
+  /// Takes back a belief saved from belief(): the same bits go on.
+  Status restore(const BeliefType& saved) {
+    if (check() != Status::kOk) return check();
+    const Status status = check_belief(saved);
+    if (status != Status::kOk) return status;
     belief_ = saved;
     ready_ = Status::kOk;
     return Status::kOk;

@@ -4,6 +4,7 @@
 
 #include "auvest/math/linear_algebra.hpp"
 #include "auvest/math/random.hpp"
+#include "auvest/slat/definite.hpp"
 #include "auvest/slat/echo.hpp"
 #include "auvest/slat/slat_filter.hpp"
 #include "auvest/status.hpp"
@@ -49,6 +50,7 @@ class DeadReckoning : public SlatFilter<Motion_, 0> {
         this->check_prediction(*this, dt, u, nullptr, longest_step_s_, Frame::extent_of(pose_));
     if (status != Status::kOk) return status;
     motion_.propagate(motion_.step(u, dt), pose_);
+    if (heading_is_open(pose_.P)) raise_pivots(pose_.P);
     return Status::kOk;
   }
 

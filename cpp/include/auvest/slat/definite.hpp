@@ -100,5 +100,20 @@ AUVEST_COLD void raise_pivots(Matrix<Scalar, N, N>& P) {
   }
 }
 
+/// The same for a covariance that is indefinite by more than rounding; no bit of others changes.
+template <class Scalar, int N>
+AUVEST_COLD void mend_indefinite(Matrix<Scalar, N, N>& P) {
+  Matrix<Scalar, N, N> p = P;
+  if (!math::ldlt(p)) raise_pivots(P);
+}
+
+/// Whether nothing is known of the heading, the third state of a pose: its sigma is beyond a turn.
+/// The position then goes by multiples of that sigma, forth and back, and may end with a variance
+/// that lies in the last digits of what it came from.
+template <class Scalar, int Pose>
+bool heading_is_open(const Matrix<Scalar, Pose, Pose>& P) {
+  return Pose > 2 && !(P(Pose - 1, Pose - 1) < Scalar(40));
+}
+
 }  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -20,12 +20,16 @@ struct Echo {
 };
 
 /// kOk if an update by `count` echoes of `masters` masters is possible: finite, of ranges that the
-/// sonar can measure, each master at most once, no more echoes than masters.
+/// sonar can measure, each master at most once, no more echoes than masters, and no sigma so large
+/// that its square leaves no room for sums.
 template <class Scalar>
 inline Status check_echoes(const Echo<Scalar>* echoes, int count, int masters,
                            const Sonar<Scalar>& sonar, int pose_states) {
   if (count < 0 || count > masters || sonar.check(pose_states) != Status::kOk)
     return Status::kBadParameter;
+  if (sonar.params.sigma_range_m > Scalar(1e15) || sonar.params.sigma_bearing_rad > Scalar(1e6)) {
+    return Status::kOverflow;
+  }
   for (int s = 0; s < count; ++s) {
     if (!math::all_finite(echoes[s].z)) return Status::kNotFinite;
     const int master = echoes[s].master;

@@ -99,6 +99,7 @@ struct JointGaussian {
         move_block(by_master[n], first_of(n), by_master[m], first_of(m), joint);
       }
     }
+    if (heading_is_open(pose.P)) raise_pivots(joint.P);
   }
 
   /// Corrects by an echo z of master n. False, with `joint` as it was, where the result would not
@@ -310,8 +311,10 @@ struct JointGaussian {
                    Joint& joint) {
     const auto before = unseen_variances<kObserved>(ordered.P);
     const Scalar few = Scalar(1e4) * math::machine_epsilon<Scalar>();
-    bool faint = false;  // the master's place relative to the slave, beside their drift
-    for (int i = kPose; i < kObserved; ++i) {
+    // The slave across the line that an echo has left of it, or the master's place relative to the
+    // slave, beside their drift: the parts of B cancel.
+    bool faint = false;
+    for (int i = 1; i < kObserved; ++i) {
       faint = faint || root(i, i) * root(i, i) < few * ordered.P(i, i);
     }
     if (!move_belief(ordered, root, slope, posterior)) return false;

@@ -48,77 +48,76 @@ class Outage {
   Status share(const SlaveBelief& slave, const MasterBelief* masters, int count) {
     constexpr int kRoom = Filter::kMasters;
     if (count < 0 || count > Masters || (kRoom > 0 && count > kRoom)) return Status::kBadParameter;
-    const Status status = check_start(slave);
-    if (status != Status::kOk) return status;
-    for (int n = 0; n < count; ++n) {
-      const Status sound = check_newcomer(masters[n]);
-      if (sound != Status::kOk) return sound;
-    }
-    slave_ = slave;
-    count_ = count;
-    for (int n = 0; n < count; ++n) masters_[n] = masters[n];
-    mode_ = Communication::kUp;
-    return Status::kOk;
+    Status status = check_start(slave);
+    for (int n = 0; n < count && status == Status::kOk; ++n) status = check_newcomer(masters[n]);
   }
+  if (status != Status::kOk) return status;
+  slave_ = slave;
+  count_ = count;
+  for (int n = 0; n < count; ++n) masters_[n] = masters[n];
+  mode_ = Communication::kUp;
+  return Status::kOk;
+}
 
-  /// The first prediction after a shared state starts the filter from it. One that is refused does
-  /// not.
-  Status predict(Scalar dt, const Control& u, math::Random& random,
-                 const VelocityChange* changes = nullptr) {
-    if (mode_ == Communication::kNever) return Status::kNotInitialised;
-    if (mode_ == Communication::kDown) return filter_.predict(dt, u, random, changes);
-    if (!math::is_finite(dt) || !math::all_finite(u)) return Status::kNotFinite;
-    if (dt < Scalar(0)) return Status::kTimeBackwards;
-    if (dt > filter_.longest_step_s()) return Status::kStepTooLong;
-    if (!plan_finite(changes, count_)) return Status::kNotFinite;
-    const math::Random before = random;
-    Status status = filter_.reset(slave_, random);
-    for (int n = 0; n < count_ && status == Status::kOk; ++n) {
-      status = filter_.add_master(masters_[n]);
-    }
-    if (status == Status::kOk) status = filter_.predict(dt, u, random, changes);
-    if (status == Status::kOk) {
-      mode_ = Communication::kDown;
-    } else {
-      random = before;
-    }
-    return status;
+/// The first prediction after a shared state starts the filter from it. One that is refused does
+/// not.
+Status
+predict(Scalar dt, const Control& u, math::Random& random,
+        const VelocityChange* changes = nullptr) {
+  if (mode_ == Communication::kNever) return Status::kNotInitialised;
+  if (mode_ == Communication::kDown) return filter_.predict(dt, u, random, changes);
+  if (!math::is_finite(dt) || !math::all_finite(u)) return Status::kNotFinite;
+  if (dt < Scalar(0)) return Status::kTimeBackwards;
+  if (dt > filter_.longest_step_s()) return Status::kStepTooLong;
+  if (!plan_finite(changes, count_)) return Status::kNotFinite;
+  const math::Random before = random;
+  Status status = filter_.reset(slave_, random);
+  for (int n = 0; n < count_ && status == Status::kOk; ++n) {
+    status = filter_.add_master(masters_[n]);
   }
-
-  /// An echo counts only while the filter runs.
-  Status update(const Echo<Scalar>* echoes, int count, const Sonar<Scalar>& sonar,
-                math::Random& random) {
-    if (mode_ == Communication::kNever) return Status::kNotInitialised;
-    return mode_ == Communication::kUp ? Status::kOk : filter_.update(echoes, count, sonar, random);
+  if (status == Status::kOk) status = filter_.predict(dt, u, random, changes);
+  if (status == Status::kOk) {
+    mode_ = Communication::kDown;
+  } else {
+    random = before;
   }
+  return status;
+}
 
-  SlaveBelief slave() const { return mode_ == Communication::kDown ? filter_.slave() : slave_; }
-  MasterBelief master(int n) const {
-    return mode_ == Communication::kDown ? filter_.master(n) : masters_[n];
-  }
-  Communication mode() const { return mode_; }
-  const Filter& filter() const { return filter_; }
+/// An echo counts only while the filter runs.
+Status update(const Echo<Scalar>* echoes, int count, const Sonar<Scalar>& sonar,
+              math::Random& random) {
+  if (mode_ == Communication::kNever) return Status::kNotInitialised;
+  return mode_ == Communication::kUp ? Status::kOk : filter_.update(echoes, count, sonar, random);
+}
 
- private:
-  Filter filter_;
-  SlaveBelief slave_;
-  MasterBelief masters_[Masters];
-  int count_ = 0;
-  Communication mode_;
+SlaveBelief slave() const { return mode_ == Communication::kDown ? filter_.slave() : slave_; }
+MasterBelief master(int n) const {
+  return mode_ == Communication::kDown ? filter_.master(n) : masters_[n];
+}
+Communication mode() const { return mode_; }
+const Filter& filter() const { return filter_; }
 
- public:
-  int shared_masters() const { return count_; }  ///< of the last shared state
+private:
+Filter filter_;
+SlaveBelief slave_;
+MasterBelief masters_[Masters];
+int count_ = 0;
+Communication mode_;
 
-  /// Hands all numbers of the state to `visit`, which keeps them, or overwrites them by those that
-  /// were kept: to save a filter and to go on from there. `Self` is this class, const to save.
-  template <class Self, class Visit>
-  static void visit_state(Self& self, Visit& visit) {
-    visit.count(self.mode_, Communication::kDown);
-    visit.count(self.count_, Masters);
-    if (self.mode_ != Communication::kNever) visit(self.slave_);
-    for (int n = 0; n < self.count_; ++n) visit(self.masters_[n]);
-    visit(self.filter_);
-  }
+public:
+int shared_masters() const { return count_; }  ///< of the last shared state
+
+/// Hands all numbers of the state to `visit`, which keeps them, or overwrites them by those that
+/// were kept: to save a filter and to go on from there. `Self` is this class, const to save.
+template <class Self, class Visit>
+static void visit_state(Self& self, Visit& visit) {
+  visit.count(self.mode_, Communication::kDown);
+  visit.count(self.count_, Masters);
+  if (self.mode_ != Communication::kNever) visit(self.slave_);
+  for (int n = 0; n < self.count_; ++n) visit(self.masters_[n]);
+  visit(self.filter_);
+}
 };
 
 }  // namespace AUVEST_INSTRUCTIONS

@@ -46,8 +46,7 @@ struct Extent {
   Scalar square[3] = {Scalar(0), Scalar(0), Scalar(0)};
 };
 
-/// A belief of the slave to start from. Only the lower triangle of P is read; it may be singular or
-/// zero.
+/// A belief of the slave. Only the lower triangle of P is read; it may be singular or zero.
 template <class Scalar, int Pose>
 Status check_slave(const Belief<Scalar, Pose>& pose) {
   if (!math::all_finite(pose)) return Status::kNotFinite;
@@ -69,19 +68,40 @@ AUVEST_OUTLINE bool is_far(const Belief<Scalar, N>& belief) {
          math::is_coarse(belief.x(1), belief.P(1, 1));
 }
 
-/// The same, to start from: kFarFromOrigin where the format is coarse against P.
+/// What a start says of a belief of n states: kOverflow where a number or a sigma is beyond 1e9, as
+/// an echo, or a variance so small that sums of products or its inverse would not be finite in
+/// single precision; kFarFromOrigin where the format is coarse at its position
+/// (math/resolution.hpp).
+template <class Scalar>
+AUVEST_COLD Status check_numbers(const Scalar* x, const Scalar* P, int n) {
+  for (int i = 0; i < n; ++i) {
+    const Scalar variance = P[i * (n + 1)];
+    if (i < 2 && math::is_coarse(x[i], variance)) return Status::kFarFromOrigin;
+    const bool inverts = variance == Scalar(0) || variance >= Scalar(1e-30);
+    if (!inverts || !(variance <= Scalar(1e18) && math::absolute(x[i]) <= Scalar(1e9))) {
+      return Status::kOverflow;
+    }
+  }
+  return Status::kOk;
+}
+template <class Scalar, int N>
+Status check_numbers(const Belief<Scalar, N>& belief) {
+  return check_numbers(belief.x.data(), belief.P.data(), N);
+}
+
+/// A belief of the slave that a filter may start from: as check_slave, and its numbers.
 template <class Scalar, int Pose>
 Status check_start(const Belief<Scalar, Pose>& pose) {
   const Status status = check_slave(pose);
-  return status == Status::kOk && is_far(pose) ? Status::kFarFromOrigin : status;
+  return status == Status::kOk ? check_numbers(pose) : status;
 }
 
 /// A belief of a master that a filter does not have yet. Only the lower triangle of P is read.
 template <class Scalar>
 Status check_newcomer(const Belief<Scalar, 6>& master) {
   if (!math::all_finite(master.x) || !math::lower_finite(master.P)) return Status::kNotFinite;
-  if (is_far(master)) return Status::kFarFromOrigin;
-  return math::is_positive_definite(master.P) ? Status::kOk : Status::kNotPositiveDefinite;
+  return math::is_positive_definite(master.P) ? check_numbers(master)
+                                              : Status::kNotPositiveDefinite;
 }
 
 /// Masters: how many there may be. Safeguards_: see safeguards.hpp.
@@ -211,7 +231,8 @@ class SlatFilter {
     masters_ = 0;
     log_likelihood_ = Scalar(0);
     initialised_ = true;
-    hourly_noise_ = hourly_noise;
+    const Scalar most = (std::numeric_limits<Scalar>::max)();
+    hourly_noise_ = hourly_noise <= most ? hourly_noise : most;  // a number: it is saved
     safeguards_.restart();
   }
 
@@ -225,7 +246,8 @@ class SlatFilter {
   static constexpr int kHour = 3600;
 
   /// A master moves by x + v dt + a dt^2 / 2, the slave by its way, which its heading turns. Eight
-  /// digits are left for sums and products of the squares.
+  /// digits are left for sums and products of the squares, and more for an echo that finds the
+  /// slave at the end of its way.
   static AUVEST_COLD bool stays_finite(Scalar dt, Scalar speed, const Extent<Scalar>& extent,
                                        Scalar noise) {
     const Scalar hours = math::larger(Scalar(1), dt / Scalar(kHour));
@@ -234,7 +256,7 @@ class SlatFilter {
     const Scalar there = here + dt * math::sqrt(extent.square[1]) +
                          Scalar(0.5) * dt * dt * math::sqrt(extent.square[2]);
     const Scalar most = math::sqrt(Scalar(1e-8) * (std::numeric_limits<Scalar>::max)());
-    return there + way * (Scalar(1) + here) <= most &&
+    return speed <= Scalar(1e6) && way <= Scalar(1e9) && there + way * (Scalar(1) + here) <= most &&
            math::sqrt(noise) * (hours * hours) * (Scalar(1) + speed) <= most;
   }
 

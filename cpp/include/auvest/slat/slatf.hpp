@@ -25,6 +25,7 @@
 #include "auvest/particles/ordered_sum.hpp"
 #include "auvest/particles/resampling.hpp"
 #include "auvest/slat/association.hpp"
+#include "auvest/slat/definite.hpp"
 #include "auvest/slat/echo.hpp"
 #include "auvest/slat/proposals.hpp"
 #include "auvest/slat/slat_filter.hpp"
@@ -281,6 +282,7 @@ class Slatf : public SlatfFrame<
   MasterBelief master(int n) const {
     MasterBelief master = summarise<Lanes, 6, true, false>(set_, Particle::master_field(n));
     add_monte_carlo(master, MonteCarlo<Safeguards_::kActive>());
+    mend_indefinite(master.P);  // after hours of silence: those of the particles are rounded
     return master;
   }
 
