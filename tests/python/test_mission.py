@@ -178,6 +178,8 @@ def test_a_policy_chooses_the_interval():
         ({"track": "zigzag"}, "track must be 'lawnmower' or 'circle'"),
         ({"path": "bezier"}, "path must be 'waypoints', 'dubins' or 'spline'"),
         ({"path": "dubins"}, "path 'dubins' needs arc_m"),
+        ({"arc_m": 20.1}, r"arc_m = 20\.1 leaves no room: .* 20 m is the largest"),
+        ({"switch_m": 40.0}, "switch_m = 40 must be below 40"),
         ({"path": "spline", "arc_m": 20.0}, "arc_m does nothing with path 'spline'"),
         ({"path": "spline", "track": "circle"}, "path 'spline' is for the lawnmower"),
         ({"estimate": "ukf"}, "guidance 'crab' needs an estimate of the current"),

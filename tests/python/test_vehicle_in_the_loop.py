@@ -5,12 +5,13 @@ The real sketch on the simulated board is in tests/firmware/test_mission.py.
 
 from __future__ import annotations
 
+import itertools
 import json
 import struct
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
@@ -230,6 +231,10 @@ def call(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., tuple
         module.Serial = board  # type: ignore[attr-defined]
         module.SerialException = OSError  # type: ignore[attr-defined]
         monkeypatch.setitem(sys.modules, "serial", module)
+        # A clock of its own: on a busy machine what the command takes would be the chip's delay.
+        ticks = itertools.count()
+        clock = SimpleNamespace(monotonic=lambda: 1e-6 * next(ticks))
+        monkeypatch.setattr("auvest.commands.mission.time", clock)
         output = ["--output", str(tmp_path), "--json"]
         result = CliRunner().invoke(app, ["mission", "--port", "COM1", *arguments, *output])
         return result.exit_code, json.loads(result.stdout or "{}"), result.stderr
@@ -246,7 +251,7 @@ def test_a_board_at_a_port_flies_to_the_end(call: Callable[..., tuple[int, dict,
     assert values["commands"] > 4000
     assert values["awake_share_by_board"] == pytest.approx(0.12, rel=1e-3)
     assert values["awake_share_simulated"] is None
-    # The wall clock's few microseconds are the delay: what is left is the rounding.
+    # The clock's few microseconds are the delay: what is left is the rounding.
     assert abs(values["difference_m"]) < 0.005
     assert values["largest_difference_m"] == abs(values["difference_m"])  # of one run
     assert Path(document["files"]["figure"]).stat().st_size > 10_000
@@ -373,6 +378,15 @@ def test_runs_that_are_flown_are_not_flown_again(
             sketch.write_bytes(b"two")
         call("c", seed=2 if changed == "seed" else 1)
         assert flown == [0, 1, 2], changed
+
+
+def test_without_a_board_nothing_is_left(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("AUVEST_BOARD", str(tmp_path / "none"))
+    arguments = ["--simulator", __file__, "--output", str(tmp_path / "out")]
+    result = CliRunner().invoke(app, ["mission", *arguments])
+    assert result.exit_code == 1
+    assert "the chip has not steered: no program" in result.stderr
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_modes_have_the_numbers_of_the_line() -> None:

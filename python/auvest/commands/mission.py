@@ -1,6 +1,7 @@
 """``auvest mission``: play the vehicle that the sketch ``mission`` steers, on a board or simulated.
 
-The sketch runs on an Arduino at --port, or on a simulated one with --simulator. Hull, current and
+The sketch runs on an Arduino at --port, or on a simulated one with --simulator: 'make board' builds
+that, and 'python -m auvest.firmware.sketch' the .elf (firmware/README.md). Hull, current and
 sensors are here: the board reads compass, gyro, log, depth and fixes over its serial line, and its
 commands move the hull. Each run is set beside the same run without a chip ('auvest simulate
 mission' with the same seed), and every command of the chip beside that of its own pilot on the
@@ -142,6 +143,8 @@ def command(
     steered = [chip for chip in flights if chip.vehicle.flight.pose]
     outcomes = known | {chip.vehicle.run: outcome(plan, chip) for chip in steered}
     if not outcomes:
+        if kept is not None:
+            montecarlo.discard(kept.folder)
         why = session.trouble or "interrupted"
         code = ExitCode.INTERRUPTED if session.interrupted else ExitCode.FAILED
         terminal.fail(f"the chip has not steered: {why}", code)

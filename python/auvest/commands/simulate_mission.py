@@ -86,7 +86,12 @@ def command(
         float, option(_VEHICLE, "Through the water, m/s.", check=positive)
     ] = _MISSION.speed_m_s,
     guidance: Annotated[
-        Law, option(_VEHICLE, "Law; crab feeds the estimated current forward.")
+        Law,
+        option(
+            _VEHICLE,
+            "Law; crab feeds the estimated current forward, so it needs --filter truth or "
+            "model-aided.",
+        ),
     ] = "crab",
     kind: Annotated[
         Estimate,
@@ -256,9 +261,12 @@ def _table(values: dict[str, Any], plan: Mission) -> Table:
         text = f"{values[name]:.3f}" + ("" if math.isnan(error) else f" ± {error:.3f}")
         return text, unit
 
+    smooth = plan.track == "circle" or plan.path != "waypoints"
+    since = "after 60 s" if smooth else "from 50 m into a leg"
+    everything = "from the start" if smooth else "corners too"
     rows = [
-        ("cross-track RMS, settled", *with_error("settled_rms_m", "m")),
-        ("cross-track RMS, corners too", *with_error("all_rms_m", "m")),
+        (f"cross-track RMS, settled ({since})", *with_error("settled_rms_m", "m")),
+        (f"cross-track RMS, {everything}", *with_error("all_rms_m", "m")),
         ("position error of the estimate, RMS", *with_error("position_rms_m", "m")),
         ("mean interval of fixes", *with_error("mean_interval_s", "s")),
         ("rudder travel", f"{values['rudder_travel_deg_s']:.1f}", "deg/s"),

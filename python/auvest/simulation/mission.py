@@ -53,6 +53,7 @@ LAWNMOWER = np.array(
     [[20, 20], [140, 20], [140, 60], [20, 60], [20, 100], [140, 100], [140, 140], [20, 140]], float
 )
 CIRCLE = (80.0, 80.0, 40.0)
+_LANES_M = 40.0
 
 #: Steps of all runs together that are kept at most: 200 bytes each.
 MAX_STEPS = 5_000_000
@@ -173,7 +174,7 @@ class Mission(Checked):
         if self.guidance == "crab" and self.estimate in ("fixes", "ukf"):
             raise ValueError(
                 f"guidance 'crab' needs an estimate of the current: 'truth' or 'model-aided', not "
-                f"{self.estimate!r}"
+                f"{self.estimate!r}; guidance 'adaptive' finds the crab angle itself"
             )
         if self.path != "waypoints" and self.track == "circle":
             raise ValueError(f"path {self.path!r} is for the lawnmower: a circle has no corner")
@@ -181,6 +182,18 @@ class Mission(Checked):
             raise ValueError(
                 "path 'dubins' needs arc_m, the radius of its turns: 20 fits lanes 40 m apart"
             )
+        if self.path == "waypoints" and self.track == "lawnmower":
+            if 2 * self.arc_m > _LANES_M:
+                raise ValueError(
+                    f"arc_m = {self.arc_m:g} leaves no room: the legs between the lanes have "
+                    f"{_LANES_M:g} m for two arcs, {_LANES_M / 2:g} m is the largest; path "
+                    "'dubins' turns on any radius"
+                )
+            if self.arc_m == 0 and self.switch_m >= _LANES_M:
+                raise ValueError(
+                    f"switch_m = {self.switch_m:g} must be below {_LANES_M:g}, the legs between "
+                    "the lanes"
+                )
         if self.path == "spline" and self.arc_m > 0:
             raise ValueError("arc_m does nothing with path 'spline', which bends as its points lie")
         if self.kernel is not None:
