@@ -324,7 +324,7 @@ def outcome(plan: Mission, chip: ChipFlight) -> montecarlo.Columns:
     }
     along, cross = flown.beside()
     pose, estimate, command = map(np.array, (flown.pose, flown.estimate_m, flown.command))
-    track = [flown.sample, pose[:, :3], estimate, flown.leg, along, cross, command]
+    track: list[Any] = [flown.sample, pose[:, :3], estimate, flown.leg, along, cross, command]
     return {
         **{name: np.array([value], np.int64) for name, value in counts.items()},
         **{name: np.array([value], float) for name, value in numbers.items()},
