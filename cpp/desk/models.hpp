@@ -136,6 +136,21 @@ class RuntimeGaussian
 
   const AnyLinearisation<Scalar>& linearisation() const { return how_; }
 
+ protected:
+  /// As in the core, for whatever is built on this filter; the belief is one that restore() takes.
+  template <class Model, class Rule, class Report>
+  Status correct(const typename Model::Measurement& z, const Model& model, Rule&& rule,
+                 Report& correction) {
+    BeliefType& belief = this->belief_in_place();
+    const BeliefType before = belief;
+    const std::decay_t<Rule> as_it_was = rule;
+    const Status status = Base::correct(z, model, rule, correction);
+    if (status != Status::kOk || keep_belief<RuntimeGaussian>(before, belief)) return status;
+    belief = before;
+    rule = as_it_was;
+    return Status::kOverflow;
+  }
+
  private:
   AnyLinearisation<Scalar> how_;
 };
@@ -170,25 +185,8 @@ struct ComponentSequences {
   }
 };
 
-/// The robust update with any kernel and recovery; its belief is one that restore() takes.
 template <class Scalar>
-struct RuntimeRule : RobustUpdate<AnyKernel<Scalar>, AnyRecovery<Scalar>> {
-  using Base = RobustUpdate<AnyKernel<Scalar>, AnyRecovery<Scalar>>;
-  using Base::Base;
-
-  template <int N, class... Arguments>
-  Status operator()(Belief<Scalar, N>& belief, Arguments&&... arguments) {
-    const Belief<Scalar, N> before = belief;
-    const Base rule = *this;
-    const Status status = Base::operator()(belief, std::forward<Arguments>(arguments)...);
-    if (status != Status::kOk || keep_belief<RuntimeGaussian<Scalar, N>>(before, belief)) {
-      return status;
-    }
-    belief = before;
-    static_cast<Base&>(*this) = rule;
-    return Status::kOverflow;
-  }
-};
+using RuntimeRule = RobustUpdate<AnyKernel<Scalar>, AnyRecovery<Scalar>>;
 
 template <class Scalar, int N>
 using RuntimeInside = Robust<RuntimeGaussian<Scalar, N>, RuntimeRule<Scalar>>;
