@@ -174,6 +174,11 @@ def test_a_vehicle_notices_another_board() -> None:
 # ---- A board at a port ---------------------------------------------------------------------------
 
 
+COLUMNS = telemetry.frame(
+    "COLUMNS,MISSION,sample#,time_s,mode#,awake_us#,refused#,missed#,implausible#,late#"
+)
+
+
 class PortWithPilot:
     """Stands for serial.Serial: a board whose sketch is the pilot on the desk."""
 
@@ -202,12 +207,7 @@ class PortWithPilot:
             return
         if self._twin.listener.start is None:
             self._twin.start(lines[0])
-            self._out.append(
-                telemetry.frame(
-                    "COLUMNS,MISSION,sample#,time_s,mode#,awake_us#,refused#,missed#,implausible#,"
-                    "late#"
-                )
-            )
+            self._out.append(COLUMNS)
         else:
             command = list(self._twin.step(lines))
             k = self._twin.sample
@@ -325,7 +325,7 @@ def test_runs_that_are_flown_are_not_flown_again(
         run = chip.vehicle.run
         flown.append(run)
         chip.hear(telemetry.frame("READY"), 0.0)
-        chip.hear("# columns: sample,time_s,mode,awake_us,refused,missed,implausible,late", 0.0)
+        chip.hear(COLUMNS, 0.0)
         for k in range(1, samples + 1):
             chip.hear(telemetry.frame(f"SENSE,{k},{int(k % 5 == 0)}"), 0.1 * k)
             chip.hear(telemetry.frame(f"MISSION,{k},{k / 10},1,{900 * run},{run},0,0,2"), 0.1 * k)
