@@ -239,7 +239,8 @@ class SlatModel : public bindings::SlatInterface<typename Filter::Scalar, Filter
     self.read(readings);
     Belief<Scalar, Filter::kPose> pose;
     this->slave(pose.x, pose.P);
-    bool sound = check_slave(pose) == Status::kOk;
+    // The error of the mean over particles is kept in both triangles.
+    bool sound = check_slave(pose) == Status::kOk && pose.P == pose.P.transpose();
     for (int n = 0; sound && n < readings.masters; ++n) {
       Belief<Scalar, 6> master;
       this->master(n, master.x, master.P);

@@ -80,23 +80,35 @@ AUVEST_INLINE void keep_definite(const Vector<Value, U>& before, const Matrix<Va
 
 /// Raises the variances of a covariance (lower triangle) by what its pivots lack to be more than
 /// rounding noise. For slave and masters whose common drift is so large that what is known of one
-/// relative to the other lies in the last digits.
+/// relative to the other lies in the last digits. Where a variance would double, as of a matrix
+/// that is indefinite beyond rounding, all grow by the same share first, the least that serves.
 template <class Scalar, int N>
 AUVEST_COLD void raise_pivots(Matrix<Scalar, N, N>& P) {
   const Scalar noise = Scalar(16) * math::machine_epsilon<Scalar>();
-  Matrix<Scalar, N, N> l;  // P = L D L', D on the diagonal
-  for (int i = 0; i < N; ++i) {
-    for (int j = 0; j <= i; ++j) {
-      Scalar c = P(i, j);
-      for (int k = 0; k < j; ++k) c = c - l(i, k) * l(k, k) * l(j, k);
-      const bool there = l(j, j) > Scalar(0);  // not so for masters that were not added
-      l(i, j) = i == j ? c : there ? Scalar(c / l(j, j)) : Scalar(0);
+  for (Scalar share = noise;; share = Scalar(4) * share) {
+    Matrix<Scalar, N, N> l;  // P = L D L', D on the diagonal
+    Vector<Scalar, N> lack;
+    bool moderate = true;
+    for (int i = 0; i < N; ++i) {
+      for (int j = 0; j <= i; ++j) {
+        Scalar c = P(i, j);
+        for (int k = 0; k < j; ++k) c = c - l(i, k) * l(k, k) * l(j, k);
+        const bool there = l(j, j) > Scalar(0);  // not so for masters that were not added
+        l(i, j) = i == j ? c : there ? Scalar(c / l(j, j)) : Scalar(0);
+      }
+      lack(i) = noise * P(i, i) - l(i, i);
+      if (lack(i) > Scalar(0)) {
+        l(i, i) = l(i, i) + lack(i);
+        moderate = moderate && lack(i) <= P(i, i);
+      } else {
+        lack(i) = Scalar(0);
+      }
     }
-    const Scalar lack = noise * P(i, i) - l(i, i);
-    if (lack > Scalar(0)) {
-      P(i, i) = P(i, i) + lack;
-      l(i, i) = l(i, i) + lack;
+    if (moderate || share > Scalar(1e6)) {
+      for (int i = 0; i < N; ++i) P(i, i) = P(i, i) + lack(i);
+      return;
     }
+    for (int i = 0; i < N; ++i) P(i, i) = P(i, i) + share * P(i, i);
   }
 }
 
