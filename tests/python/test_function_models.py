@@ -560,7 +560,7 @@ CONSTRUCTIONS = {
             sensors=auvest.RangeBearing(),
         ),
         ValueError,
-        "RangeBearing is made for 2, 3, 4, 6 states, not for 5",
+        "RangeBearing is made for 2, 3, 4, 6, 8 states, not for 5",
     ),
 }
 

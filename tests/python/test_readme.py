@@ -63,8 +63,8 @@ def test_cpp_block(code, run_cpp):
 def test_console_line(arguments, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for name in arguments:
-        if name.endswith(".elf"):  # what the lines before would have made
-            (tmp_path / name).parent.mkdir(parents=True)
+        if name.endswith((".elf", ".hpp")):  # what the lines before would have made
+            (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
             (tmp_path / name).touch()
     command = typer.main.get_command(app)
     while arguments and arguments[0] in getattr(command, "commands", {}):

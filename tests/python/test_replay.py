@@ -973,7 +973,7 @@ def test_command_says_what_was_not_used(tmp_path: Path) -> None:
     [
         (["nowhere"], "is not a folder"),
         (["log", "./log"], "two logs have the name log"),
-        (["log", "--config", "none.toml"], "cannot be read"),
+        (["log", "--config", "none.toml"], "none.toml: there is no such file"),
         (["log", "--filter", "aukf"], "filter aukf chooses"),
     ],
 )

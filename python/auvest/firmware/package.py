@@ -28,6 +28,7 @@ from auvest._headers import firmware_folder, include_folders
 NAME = "auvest"
 
 _INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*[<"]([^<>"]+)[>"]', re.MULTILINE)
+_FOREIGN = re.compile(r"/arch/(?!Default/)|_BLAS\.h$|_MKL\.h$|/misc/")
 # A type of namespace auvest, which begins a line; what is for the library's own use.
 _TYPE = re.compile(r"^(?:class|struct|enum class|using) (\w+)(?![\w<;])", re.MULTILINE)
 _DETAIL = re.compile(r"namespace detail \{.*?\n\}  // namespace detail", re.DOTALL)
@@ -41,7 +42,7 @@ def _holding(name: str, folders: list[Path]) -> Path:
 def eigen_headers(eigen: Path) -> list[PurePosixPath]:
     """Give the headers that Eigen/Core includes under some condition, relative to its folder.
 
-    Those for vector instructions are left out: chips have none.
+    Those for vector instructions and for other libraries are left out: chips have none.
     """
     found: set[PurePosixPath] = set()
     left = [PurePosixPath("Eigen/Core")]
@@ -51,9 +52,10 @@ def eigen_headers(eigen: Path) -> list[PurePosixPath]:
         for name in _INCLUDE.findall((eigen / header).read_text(encoding="utf-8")):
             for folder in (header.parent, PurePosixPath()):
                 path = PurePosixPath(os.path.normpath(folder / name))
-                vectors = "arch" in path.parts and "Default" not in path.parts
-                if vectors or path.parts[0] != "Eigen" or not (eigen / path).is_file():
+                if path.parts[0] != "Eigen" or not (eigen / path).is_file():
                     continue
+                if _FOREIGN.search(str(path)):
+                    break
                 if path not in found:
                     left.append(path)
                 break

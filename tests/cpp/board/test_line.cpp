@@ -59,10 +59,10 @@ TEST_CASE("Crc32: the check value of every catalogue, and zlib's of other texts"
 }
 
 TEST_CASE("Crc32: as the polynomial says, bit by bit") {
-  for (int byte = 0; byte < 256; ++byte) {
+  for (std::uint32_t byte = 0; byte < 256; ++byte) {
     for (const std::uint32_t before : {0u, 0xffffffffu, 0x12345678u}) {
       // A CRC that has come so far, and one byte more.
-      std::uint32_t rest = before ^ static_cast<std::uint32_t>(byte);
+      std::uint32_t rest = before ^ byte;
       for (int bit = 0; bit < 8; ++bit) rest = (rest >> 1) ^ ((rest & 1) ? 0xedb88320u : 0u);
       const std::uint32_t step = auvest::kCrcOfLowerBits[(before ^ byte) & 15] ^
                                  auvest::kCrcOfUpperBits[((before ^ byte) >> 4) & 15];
