@@ -77,6 +77,7 @@ inline ExplicitDouble exp(ExplicitDouble x) { return ExplicitDouble(exp(double(x
 inline ExplicitDouble log(ExplicitDouble x) { return ExplicitDouble(log(double(x))); }
 inline ExplicitDouble exp_normal(ExplicitDouble x) { return exp(x); }
 inline ExplicitDouble log_normal(ExplicitDouble x) { return log(x); }
+inline bool may_be_coarse(ExplicitDouble square) { return may_be_coarse(double(square)); }
 inline bool is_coarse(ExplicitDouble x, ExplicitDouble variance) {
   return is_coarse(double(x), double(variance));
 }

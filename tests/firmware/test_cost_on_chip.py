@@ -122,14 +122,17 @@ REGISTRY = [
     ("robust-ekf", "SpeedHeadingCurrent", PLANE),
     ("ekf", "ConstantAcceleration", PLANE),
     ("aukf", "ConstantAcceleration(discretisation='euler')", PLANE),
+    ("ekf", "PlanarHull", ("RangeBearing", "HeadingSpeed")),
 ]
+#: What drives a process: speed and heading, a way and a turn, rudder and propeller.
+DRIVEN = {"Speed": [1.0, 0.0, 0.5], "Odometry": [1.0, 0.0, 0.5], "PlanarHull": [0.05, 12.0]}
 
 
 @pytest.mark.parametrize(("filter_name", "process", "sensors"), REGISTRY)
 def test_every_model_of_the_registry_keeps_its_bits_on_the_chip(
     measure, filter_name, process, sensors
 ):
-    driven = [1.0, 0.0, 0.5] if "Speed" in process or process == "Odometry" else None
+    driven = next((mean for name, mean in DRIVEN.items() if name in process), None)
     found = measure(filter=filter_name, process=process, sensors=sensors, input=driven, steps=60)
     assert found.difference is None
     assert found.numbers >= 60 * 5

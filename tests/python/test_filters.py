@@ -114,6 +114,8 @@ def test_range_bearing_of_one_state_and_of_many():
     z = model.h(x)
     assert z == pytest.approx(np.array([[5, np.arctan2(4, 3)], [1, -np.pi / 2], [0, 0]]))
     assert same_bits(model.h(x[0]), z[0])
+    with pytest.raises(ValueError, match="not finite: is it too large"):
+        model.h([0.0, 1e308])
 
 
 def test_defaults_are_those_of_the_core():

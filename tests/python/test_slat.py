@@ -435,6 +435,8 @@ BAD_MAKE: list[tuple[dict[str, Any], str]] = [
     ({"gate": -1}, "gate must not be negative"),
     ({"carry_covariance": 1}, "carry_covariance must be True or False"),
     ({"birth_velocity_m_s": 1, "gate": 0}, "birth_velocity_m_s needs a gate"),
+    ({"birth_velocity_m_s": 2e9}, r"birth_velocity_m_s must be at most 1e\+09"),
+    ({"rebirth_acceleration_m_s2": 1e200}, "rebirth_acceleration_m_s2 must be at most"),
     ({"birth_acceleration_m_s2": 0}, "birth_acceleration_m_s2 must be positive"),
     ({"motion": Sonar()}, "motion must be an auvest.CompassMotion or auvest.UnicycleMotion"),
     ({"master": None}, "master must be an auvest.PiecewiseAcceleration"),

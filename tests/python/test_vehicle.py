@@ -96,6 +96,9 @@ def test_a_step_that_is_too_long_is_refused_with_the_longest():
     with pytest.raises(ValueError, match=r"dt must be at most 0\.\d+ s for rk4"):
         hull.run(np.tile(STRAIGHT, (10, 1)), 5.0)
     assert 0.1 < most < 5.0
+    # Rates whose modes overflow: no step is stable, and that is said at once.
+    with pytest.raises(ValueError, match="dt must be at most"):
+        hull.run(STRAIGHT, 0.1, velocity=[1.0, 0.0, 0.0, 0.0, 1e39, 0.0])
 
 
 def test_wrong_arguments_are_refused_by_name():

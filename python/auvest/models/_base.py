@@ -220,6 +220,11 @@ class MeasurementModel(Model):
         Returns
         -------
         ndarray, shape (m,) or (K, m)
+
+        Raises
+        ------
+        ValueError
+            If a shape is wrong, or a state so large that its measurement is not finite.
         """
         least = len(self.observes)
         shape = np.shape(x)
@@ -232,6 +237,8 @@ class MeasurementModel(Model):
         leading = np.zeros((len(rows), states))
         leading[:, : min(states, rows.shape[1])] = rows[:, :states]
         z: npt.NDArray[np.float64] = self.core(states, _FLOAT64).h(leading)
+        if not np.isfinite(z).all():
+            raise ValueError("x would be measured as what is not finite: is it too large?")
         return z[0] if len(shape) == 1 else z
 
     def check_process(self, process: ProcessModel) -> None:

@@ -52,7 +52,7 @@ MAX_MASTERS = _core.slat_max_masters
 UNKNOWN_MASTER = _core.slat_unknown_master
 
 #: Ranges and bearings that the filters take at most.
-_LARGEST_Z = 1e9
+_LARGEST = 1e9
 
 COMPASS = CompassMotion()
 MASTER = PiecewiseAcceleration()
@@ -722,6 +722,8 @@ class SlatFilter(Steps):
                 continue
             bound: Bound = "positive" if name in _POSITIVE else "not negative"
             params[name] = as_number(name, value, bound, infinite=name == "longest_step_s")
+            if "birth_" in name and params[name] > _LARGEST:
+                raise ValueError(f"{name} must be at most {_LARGEST:g}, not {params[name]:g}")
             if name in ("resample_below", "kept") and params[name] > 1:
                 raise ValueError(f"{name} must lie in 0..1, not {params[name]:g}")
         if params.get("recover_after", 0) > params.get("recover_of", 0):
@@ -826,7 +828,7 @@ def _require_ascending(name: str, times: Floats) -> None:
 
 
 def _require_moderate(z: Floats) -> None:
-    far = np.argwhere(np.abs(np.nan_to_num(z)) > _LARGEST_Z)
+    far = np.argwhere(np.abs(np.nan_to_num(z)) > _LARGEST)
     if far.size:
         row, column = (int(i) for i in far[0])
         raise ValueError(f"z[{row}, {column}] is {z[row, column]}, beyond 1e9")

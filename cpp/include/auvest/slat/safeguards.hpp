@@ -50,11 +50,15 @@ struct EchoParams {
     return rebirth_acceleration_m_s2 * rebirth_acceleration_m_s2;
   }
 
+  /// The largest of the standard deviations: the square of a larger one leaves no room for sums.
+  static constexpr Scalar most() { return Scalar(1e9); }
+
   bool valid() const {
     return math::is_nonnegative(gate) && recover_after >= 0 && recover_of >= recover_after &&
            recover_of <= 16 && math::is_positive(fastest_m_s) &&
            math::is_nonnegative(forget_after_s) && math::is_positive(rebirth_velocity_m_s) &&
-           math::is_positive(rebirth_acceleration_m_s2) && longest_step_s > Scalar(0);
+           rebirth_velocity_m_s <= most() && math::is_positive(rebirth_acceleration_m_s2) &&
+           rebirth_acceleration_m_s2 <= most() && longest_step_s > Scalar(0);
   }
 };
 

@@ -141,7 +141,9 @@ class Slatf : public SlatfFrame<
   Status reset(const SlaveBelief& pose, int particles, math::Random& random) {
     const bool valid = this->fits(particles) && Frame::is_share(params_.resample_below) &&
                        params_.valid() && math::is_nonnegative(params_.birth_velocity_m_s) &&
+                       params_.birth_velocity_m_s <= Params::most() &&
                        math::is_positive(params_.birth_acceleration_m_s2) &&
+                       params_.birth_acceleration_m_s2 <= Params::most() &&
                        (params_.gate > Scalar(0) || !births());
     if (!valid || motion_.check() != Status::kOk || master_.check() != Status::kOk) {
       return Status::kBadParameter;

@@ -110,8 +110,9 @@ class LinearHull {
     }
     Scalar trace = Scalar(0);
     for (int i = 0; i < kSize; ++i) trace = trace + s(i, i);
+    if (!math::is_finite(trace)) return kSize;  // too large to tell
     int count = 0;
-    while (Scalar(2 * count - kSize) < trace - Scalar(1)) ++count;
+    while (count < kSize && Scalar(2 * count - kSize) < trace - Scalar(1)) ++count;
     return count;
   }
 
