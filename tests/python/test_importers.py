@@ -138,6 +138,16 @@ def test_mrclam6_makes_each_robot_the_slave_of_the_others(tmp_path: Path) -> Non
     np.testing.assert_allclose(whole(logs["robot1"], "truth.csv"), [[0, 1, 1.5, 0.25]], rtol=1e-15)
 
 
+def test_mrclam6_with_one_robot_is_refused_by_its_file(tmp_path: Path) -> None:
+    files = {
+        "sightings.csv": "t,observer,subject,range\n3.0,1,2,5.0\n",
+        "odometry.csv": "robot,t,v,w\n1,0.5,0.25,0.125\n",
+        "groundtruth.csv": "robot,t,x,y,theta\n1,0.0,1.0,1.5,0.25\n",
+    }
+    with pytest.raises(LogError, match=r"groundtruth\.csv: one robot alone"):
+        imported(tmp_path, "mrclam6", files)
+
+
 def test_mrclam_counts_time_from_the_first_whole_second(tmp_path: Path) -> None:
     """All of a robot's files have one clock; a barcode that no robot wears is left out."""
     files = {"Barcodes.dat": "# subject barcode\n1 5\n2 14\n3 41\n4 32\n5 23\n6 72\n"}

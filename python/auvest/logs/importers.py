@@ -158,8 +158,9 @@ def mrclam6(source: Path) -> dict[str, Log]:
     odometry = _table(source / "odometry.csv", "robot", "t", "v", "w")
     truth = _table(source / "groundtruth.csv", "robot", "t", "x", "y", "theta")
     robots = np.unique(truth[:, 0]).astype(int).tolist()
+    if len(robots) < 2:
+        raise LogError(source / "groundtruth.csv", "one robot alone has nobody to range to")
     return _robots(
-        source,
         sightings,
         {robot: odometry[odometry[:, 0] == robot, 1:] for robot in robots},
         {robot: truth[truth[:, 0] == robot, 1:] for robot in robots},
@@ -185,7 +186,7 @@ def mrclam(source: Path) -> dict[str, Log]:
         subject = np.array([barcodes.get(code, -1) for code in seen[:, 1]], float)
         observer = np.full(len(seen), float(robot))
         sightings.append(np.column_stack([seen[:, 0] - start, observer, subject, seen[:, 2]]))
-    return _robots(source, np.concatenate(sightings), odometry, truth)
+    return _robots(np.concatenate(sightings), odometry, truth)
 
 
 @_importer
@@ -224,14 +225,12 @@ IMPORTERS: Mapping[str, Importer] = {
 
 
 def _robots(
-    source: Path, sightings: Rows, odometry: Mapping[int, Rows], truth: Mapping[int, Rows]
+    sightings: Rows, odometry: Mapping[int, Rows], truth: Mapping[int, Rows]
 ) -> dict[str, Log]:
     sightings = sightings[np.argsort(sightings[:, 0], kind="stable")]
     logs: dict[str, Log] = {}
     for robot in truth:
         others = [other for other in truth if other != robot]
-        if not others:
-            raise LogError(source, "one robot alone has nobody to range to")
         observer, subject = sightings[:, 1], sightings[:, 2]
         mine = (observer == robot) & np.isin(subject, others)
         mine |= (subject == robot) & np.isin(observer, others)

@@ -138,7 +138,8 @@ TEST_CASE("planar hull: forces come through the mass matrix") {
   ahead.body.xg_m = 0.1;
   const Process coupled(p, ahead);
   REQUIRE(coupled.check() == Status::kOk);
-  const auto& full = auvest::Hull<auvest::Torpedo<double>, auvest::ThreeDof>(ahead).mass_matrix();
+  const auvest::Hull<auvest::Torpedo<double>, auvest::ThreeDof> hull(ahead);
+  const auto& full = hull.mass_matrix();
   auvest::Matrix<double, 3, 3> m;
   const int axes[] = {0, 1, 5};
   for (int i = 0; i < 3; ++i) {

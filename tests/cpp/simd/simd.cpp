@@ -318,7 +318,7 @@ struct Run {
         noise.normal_pair(a, b);
         // Now and then an outlier.
         const float scale = k % 17 == 16 ? 100.0f : 1.0f;
-        seen[n].z(0) = math::sqrt(dx * dx + dy * dy) + scale * a;
+        seen[n].z(0) = math::absolute(math::sqrt(dx * dx + dy * dy) + scale * a);
         seen[n].z(1) = math::atan2(dy, dx) + scale * 0.06f * b;
         if (bearing == auvest::Bearing::kFromHeading) seen[n].z(1) -= slave(Filter::kPose - 1);
       }
