@@ -32,7 +32,7 @@ bool same_bits(const char* name) {
     truth(0) = Scalar(0.2) + Scalar(10) * c;
     truth(1) = Scalar(2) + Scalar(0.05) * s;
     auto z = sensor.h(truth);
-    z(0) += Scalar(0.05) * random.normal<Scalar>();
+    z(0) = auvest::math::absolute(z(0) + Scalar(0.05) * random.normal<Scalar>());
     z(1) = auvest::math::wrap(z(1) + Scalar(0.01) * random.normal<Scalar>());
     if (mine.predict(Scalar(0.1)) != Status::kOk) return false;
     if (built.predict(Scalar(0.1)) != Status::kOk) return false;
