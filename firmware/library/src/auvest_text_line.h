@@ -10,6 +10,7 @@
 namespace auvest_board {
 
 constexpr uint32_t kBaud = 115200;
+constexpr uint32_t kMicrosecondsPerTick = 1000000 / wake_timer::kTicksPerSecond;
 
 /// A line on its way out. Its fields are printed into it like to Serial, which they go to at once.
 class LineOut : public Print {
@@ -34,6 +35,15 @@ class LineOut : public Print {
   void field(uint32_t value) {
     write(',');
     print(value);
+  }
+
+  /// Seconds, with the ticks as six decimals.
+  void field(const wake_timer::Elapsed& time) {
+    field(time.seconds);
+    const uint32_t microseconds = time.ticks * kMicrosecondsPerTick;
+    write('.');
+    for (uint32_t unit = 100000; unit > microseconds && unit > 1; unit /= 10) write('0');
+    print(microseconds);
   }
 
   void empty_field() { write(','); }

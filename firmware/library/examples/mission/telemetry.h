@@ -52,8 +52,7 @@ class Telemetry {
   void write(const Sample& sample, const Pilot& pilot) {
     line_.start("MISSION");
     line_.field(sample.number);
-    line_.field(sample.time.seconds);
-    decimals(sample.time.ticks);
+    line_.field(sample.time);
     line_.field(sample.dt);
     line_.field(static_cast<uint32_t>(sample.heard));
     line_.field(static_cast<uint32_t>(sample.fixes));
@@ -76,23 +75,12 @@ class Telemetry {
     line_.field(pilot.implausible());
     line_.field(sample.refused);
     line_.field(sample.late);
-    line_.field(sample.awake * kMicrosecondsPerTick);
+    line_.field(sample.awake * auvest_board::kMicrosecondsPerTick);
     line_.finish();
   }
 
   Line& line() { return line_; }
 
  private:
-  static constexpr uint32_t kMicrosecondsPerTick =
-      1000000 / auvest_board::wake_timer::kTicksPerSecond;
-
-  /// Ticks as the decimals of a second.
-  void decimals(uint32_t ticks) {
-    const uint32_t microseconds = ticks * kMicrosecondsPerTick;
-    line_.write('.');
-    for (uint32_t unit = 100000; unit > microseconds && unit > 1; unit /= 10) line_.write('0');
-    line_.print(microseconds);
-  }
-
   Line line_;
 };

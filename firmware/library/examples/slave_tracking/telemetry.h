@@ -59,8 +59,7 @@ class Telemetry {
   void write(const Sample& sample, const Filter& filter) {
     line_.start("SLAVE");
     line_.field(sample.number);
-    line_.field(sample.time.seconds);
-    decimals(sample.time.ticks);
+    line_.field(sample.time);
     number(sample.dt);
     for (int i = 0; i < 2; ++i) optional(sample.read, sample.u(i));
     for (int i = 0; i < 2; ++i) optional(sample.heard, sample.z(i));
@@ -76,15 +75,13 @@ class Telemetry {
     line_.field(sample.missed);
     line_.field(sample.refused);
     line_.field(sample.late);
-    line_.field(sample.awake * kMicrosecondsPerTick);
+    line_.field(sample.awake * auvest_board::kMicrosecondsPerTick);
     line_.finish();
   }
 
   Line& line() { return line_; }
 
  private:
-  static constexpr uint32_t kMicrosecondsPerTick = 1000000 / wake_timer::kTicksPerSecond;
-
   void write_slave(const Filter::SlaveBelief& slave) {
     for (int i = 0; i < 2; ++i) number(slave.x(i));
     write_position_covariance(slave.P);
@@ -117,14 +114,6 @@ class Telemetry {
     } else {
       line_.empty_field();
     }
-  }
-
-  /// Ticks as the decimals of a second.
-  void decimals(uint32_t ticks) {
-    const uint32_t microseconds = ticks * kMicrosecondsPerTick;
-    line_.write('.');
-    for (uint32_t unit = 100000; unit > microseconds && unit > 1; unit /= 10) line_.write('0');
-    line_.print(microseconds);
   }
 
   Line line_;

@@ -70,8 +70,7 @@ class Telemetry {
   void write(const Sample& sample, const Filter& filter) {
     line_.start("AUV");
     line_.field(sample.number);
-    line_.field(sample.time.seconds);
-    decimals(sample.time.ticks);
+    line_.field(sample.time);
     number(sample.dt);
     for (int i = 0; i < 2; ++i) optional(sample.measured, sample.z(i));
     for (int i = 0; i < 2; ++i) number(sample.desired(i));
@@ -85,15 +84,13 @@ class Telemetry {
     line_.field(sample.missed);
     line_.field(sample.refused);
     line_.field(sample.late);
-    line_.field(sample.awake * kMicrosecondsPerTick);
+    line_.field(sample.awake * auvest_board::kMicrosecondsPerTick);
     line_.finish();
   }
 
   Line& line() { return line_; }
 
  private:
-  static constexpr uint32_t kMicrosecondsPerTick = 1000000 / wake_timer::kTicksPerSecond;
-
   void number(float value) {
     if (kExactText) {
       line_.field(value);
@@ -109,14 +106,6 @@ class Telemetry {
     } else {
       line_.empty_field();
     }
-  }
-
-  /// Ticks as the decimals of a second.
-  void decimals(uint32_t ticks) {
-    const uint32_t microseconds = ticks * kMicrosecondsPerTick;
-    line_.write('.');
-    for (uint32_t unit = 100000; unit > microseconds && unit > 1; unit /= 10) line_.write('0');
-    line_.print(microseconds);
   }
 
   Line line_;
