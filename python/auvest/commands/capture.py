@@ -471,7 +471,8 @@ def measures(recording: Recording, *, simulated: bool) -> dict[str, Any]:
     """Compute the numbers of the table; NaN where the sketch does not report them."""
     nis = recording.column("nis")
     known = nis[np.isfinite(nis)]
-    span = float(recording.elapsed_s[-1] - recording.elapsed_s[0])
+    elapsed_s = recording.elapsed_s
+    span = float(elapsed_s[-1] - elapsed_s[0])
     awake = float(recording.column("awake_us")[1:].sum()) * 1e-6
     error = recording.columns("x_m", "y_m") - recording.columns("true_x_m", "true_y_m")
     status = recording.column("status")
