@@ -60,7 +60,7 @@ void write(Memory& memory, std::uint8_t from, std::uint8_t to) {
   Ring ring(store, kKind);
   for (std::uint8_t n = from; n <= to; ++n) {
     fill(ring, n);
-    REQUIRE(ring.begin({n, 0}) == n);
+    REQUIRE(ring.begin({n, 0, 9, false}) == n);
     while (ring.poll()) {
     }
   }
@@ -129,9 +129,9 @@ TEST_CASE("CheckpointRing: after a cut the torn slot is written again") {
   REQUIRE(found(memory) == 4);
   write(memory, 5, 5);
   CHECK(found(memory) == 5);
-  memory[5 % 3 * kSlot + 20] ^= 0x10;
+  memory[5 % 3 * kSlot + 24] ^= 0x10;
   CHECK(found(memory) == 4);
-  memory[4 % 3 * kSlot + 20] ^= 0x10;
+  memory[4 % 3 * kSlot + 24] ^= 0x10;
   CHECK(found(memory) == 3);
 }
 
@@ -151,7 +151,7 @@ TEST_CASE("CheckpointRing: all slots wear alike, and nothing else is written") {
   CheckpointRing<Counting, kPayload> ring(store, kKind);
   CHECK(ring.slots() == 4);
   for (int n = 0; n < 40; ++n) {
-    CHECK(ring.begin({0, 0}) != 0);
+    CHECK(ring.begin({0, 0, 0, false}) != 0);
     while (ring.poll()) {
     }
   }
@@ -163,12 +163,13 @@ TEST_CASE("CheckpointRing: in the background, from a copy, one at a time") {
   SlowStore store(memory.data(), memory.size());
   CheckpointRing<SlowStore, kPayload> ring(store, kKind);
   CHECK_FALSE(ring.poll());
-  CHECK(ring.begin({5, 6}) == 1);
+  CHECK(ring.begin({5, 6, 7, true}) == 1);
   CHECK(store.woken == 1);
   CHECK(store.written == 0);
   int polls = 0;
   while (ring.writing()) {
-    CHECK(ring.begin({9, 9}) == 0);  // and says so to the store, which may have been put to sleep
+    CHECK(ring.begin({9, 9, 9, false}) ==
+          0);  // and says so to the store, which may have been put to sleep
     ring.poll();
     ++polls;
   }
@@ -179,6 +180,8 @@ TEST_CASE("CheckpointRing: in the background, from a copy, one at a time") {
   CHECK(again.find() == 1);
   CHECK(again.sum() == ring.sum());
   CHECK(again.time().microseconds == 6);
+  CHECK(again.time().start == 7);
+  CHECK(again.time().absolute);
 }
 
 TEST_CASE("CheckpointRing: what is not this program's is refused") {
@@ -190,15 +193,16 @@ TEST_CASE("CheckpointRing: what is not this program's is refused") {
   CheckpointRing<ArrayStore, kPayload + 1> other_size(store, kKind);
   CHECK(other_size.find() == 0);
   // A checkpoint in another place than its sequence has: of a memory of another size.
+  write(memory, 4, 5);
   ArrayStore shorter(memory.data(), 3 * kSlot);
-  CHECK(Ring(shorter, kKind).find() == 2);  // 1 and 2 lie where they would; 3 would lie in slot 0
+  CHECK(Ring(shorter, kKind).find() == 2);  // 4 and 5, in slots 0 and 1 of four, lie elsewhere
 
   Memory zeros(4 * kSlot, 0x00);
   CHECK(found(zeros) == 0);
   Memory one(kSlot * 2 - 1, 0xff);  // no room for two
   ArrayStore small(one.data(), one.size());
   Ring ring(small, kKind);
-  CHECK(ring.begin({0, 0}) == 0);
+  CHECK(ring.begin({0, 0, 0, false}) == 0);
   CHECK_FALSE(ring.poll());
 }
 
@@ -223,7 +227,7 @@ Filter resumed(const Filter& from, Filter to) {
   Memory memory(4096, 0xff);
   ArrayStore store(memory.data(), memory.size());
   Checkpoints<Filter, ArrayStore> first(store, 1);
-  CHECK(first.begin(from, {12, 500000}) == 1);
+  CHECK(first.begin(from, {12, 500000, 3, false}) == 1);
   auvest::CheckpointWriter writer(first.payload());
   CheckpointOf<Filter>::save(from, writer);
   CHECK(writer.end() == first.payload() + CheckpointOf<Filter>::kBytes);
@@ -235,6 +239,7 @@ Filter resumed(const Filter& from, Filter to) {
   CHECK(result.sequence == 1);
   CHECK(result.time.seconds == 12);
   CHECK(result.time.microseconds == 500000);
+  CHECK_FALSE(result.time.absolute);
   return to;
 }
 
@@ -323,7 +328,9 @@ TEST_CASE("Checkpoints: what the filter refuses leaves it as it was") {
   CHECK(result.sequence == 0);
   // Whole, but of numbers that no filter has: P is 0.
   std::memset(checkpoints.payload(), 0, CheckpointOf<Filter>::kBytes);
-  REQUIRE(static_cast<Checkpoints<Filter, ArrayStore>::Ring&>(checkpoints).begin({0, 0}) == 1);
+  REQUIRE(
+      static_cast<Checkpoints<Filter, ArrayStore>::Ring&>(checkpoints).begin({0, 0, 0, false}) ==
+      1);
   while (checkpoints.poll()) {
   }
   result = checkpoints.resume(filter);
@@ -369,7 +376,7 @@ TEST_CASE("FileStore: a checkpoint outlives the program") {
     CheckpointRing<auvest::FileStore, kPayload> ring(store, kKind);
     CHECK(ring.slots() == 2);
     std::memset(ring.payload(), 5, kPayload);
-    CHECK(ring.begin({1, 2}) == 1);
+    CHECK(ring.begin({1, 2, 3, false}) == 1);
     while (ring.poll()) {
     }
   }

@@ -291,7 +291,7 @@ class Checkpoints : public CheckpointRing<Store, CheckpointOf<Kept>::kBytes> {
 
   /// Takes back the newest checkpoint that is whole.
   Resumed resume(Kept& kept) {
-    Resumed resumed = {Status::kNotInitialised, this->find(), {0, 0}};
+    Resumed resumed = {Status::kNotInitialised, this->find(), {0, 0, 0, false}};
     if (resumed.sequence == 0) return resumed;
     CheckpointReader reader(this->payload());
     resumed.status = CheckpointOf<Kept>::resume(kept, reader);

@@ -8,7 +8,7 @@
 //
 //     header     kind and size: a slot of another program, or of another filter, is refused
 //     sequence   counts checkpoints from 1; sequence modulo the number of slots is the place
-//     time       seconds and microseconds, of the filter's clock or of one that runs without power
+//     time       see CheckpointTime
 //     payload
 //     CRC-32
 //
@@ -36,17 +36,20 @@
 namespace auvest {
 inline namespace AUVEST_INSTRUCTIONS {
 
-/// A moment, as whole seconds and the rest: a float has no microseconds after a minute.
+/// When a checkpoint was made. Whole seconds and the rest: a float has no microseconds after a
+/// minute.
 struct CheckpointTime {
   std::uint32_t seconds;
   std::uint32_t microseconds;
+  std::uint32_t start;  ///< how many starts of the program there were until then, if it counts them
+  bool absolute;        ///< the time is that of a clock which goes on without power
 };
 
 /// `Payload`: bytes of what is kept.
 template <class Store, std::size_t Payload>
 class CheckpointRing {
  public:
-  static constexpr std::size_t kBefore = 16;  ///< bytes before the payload
+  static constexpr std::size_t kBefore = 21;  ///< bytes before the payload
   static constexpr std::size_t kSlotBytes = kBefore + Payload + 4;
   static_assert(Payload > 0 && kSlotBytes < 0x10000, "a slot is smaller than 64 KiB");
 
@@ -73,7 +76,7 @@ class CheckpointRing {
   /// Where the next checkpoint's payload is put together: before begin(), not while writing().
   std::uint8_t* payload() { return image_ + kBefore; }
   const std::uint8_t* payload() const { return image_ + kBefore; }
-  CheckpointTime time() const { return {word(8), word(12)}; }
+  CheckpointTime time() const { return {word(8), word(12), word(16), image_[20] != 0}; }
 
   /// The CRC-32 of the checkpoint that is found or was begun.
   std::uint32_t sum() const { return word(kBefore + Payload); }
@@ -93,6 +96,8 @@ class CheckpointRing {
     put_word(4, newest_);
     put_word(8, time.seconds);
     put_word(12, time.microseconds);
+    put_word(16, time.start);
+    image_[20] = time.absolute;
     Crc32 sum;
     for (std::size_t i = 0; i < kBefore + Payload; ++i) sum.add(image_[i]);
     put_word(kBefore + Payload, sum.value());
