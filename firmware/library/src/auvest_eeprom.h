@@ -1,9 +1,8 @@
 // Checkpoints of a filter in the EEPROM (auvest/board/checkpoint.hpp), written by the interrupt
-// that comes when the EEPROM is ready for the next byte: the sketch goes on meanwhile. It takes
-// that interrupt: include it in one file of a sketch.
+// that comes when the EEPROM is ready for the next byte: the sketch goes on meanwhile.
 //
 //     auvest_board::EepromCheckpoints<Filter> checkpoints(1);   // another number for another
-//     filter
+//     filter AUVEST_EEPROM_INTERRUPT(checkpoints)
 //
 // The last 16 bytes belong to auvest_boot.h. A byte takes 3.4 ms; it bears 100,000 writes. While
 // checkpoints.writing(), the EEPROM is not free for anything else.
@@ -48,28 +47,20 @@ class Eeprom {
   static constexpr size_t kBootCount = 16;
 };
 
-/// Called by the interrupt; false: there is nothing left to write.
-static bool (*write_eeprom)() = nullptr;
-
-/// One object for the sketch.
 template <class Kept>
 class EepromCheckpoints : public auvest::Checkpoints<Kept, Eeprom> {
  public:
-  explicit EepromCheckpoints(uint16_t kind) : auvest::Checkpoints<Kept, Eeprom>(eeprom_, kind) {
-    only_ = this;
-    write_eeprom = [] { return only_->poll(); };
-  }
+  /// `kind`: see CheckpointRing.
+  explicit EepromCheckpoints(uint16_t kind) : auvest::Checkpoints<Kept, Eeprom>(eeprom_, kind) {}
 
  private:
   Eeprom eeprom_;
-  static EepromCheckpoints* only_;
 };
-
-template <class Kept>
-EepromCheckpoints<Kept>* EepromCheckpoints<Kept>::only_ = nullptr;
 
 }  // namespace auvest_board
 
-ISR(EE_READY_vect) {
-  if (!auvest_board::write_eeprom()) EECR = 0;
-}
+/// The interrupt, for the one object of a sketch. (A pointer to it would cost half as much again.)
+#define AUVEST_EEPROM_INTERRUPT(checkpoints) \
+  ISR(EE_READY_vect) {                       \
+    if (!checkpoints.poll()) EECR = 0;       \
+  }

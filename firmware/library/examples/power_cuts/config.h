@@ -14,9 +14,9 @@ constexpr uint16_t kKind = 1;
 constexpr float kPeriod = 0.5f;         ///< from range to range [s]
 constexpr float kAnswerTimeout = 0.1f;  ///< from a request to the last character of the answer [s]
 
-/// From checkpoint to checkpoint [s]. 30 s let the EEPROM of a MEGA2560 live for 3.3 years of being
-/// switched on: firmware/README.md of auvest has the formula.
-constexpr float kCheckpointPeriod = 30;
+/// From checkpoint to checkpoint [s]. With 60 s the EEPROM of a MEGA2560 lives for 6.8 years of
+/// being switched on: firmware/README.md of auvest has the formula.
+constexpr float kCheckpointPeriod = 60;
 
 /// How long the power is off at most, the bootloader's seconds and tries of less than 0.1 s
 /// included [s]. Without a clock that goes on meanwhile, the belief is widened by what the craft

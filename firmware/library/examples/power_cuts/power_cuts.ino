@@ -44,6 +44,7 @@ constexpr float kWriting = 0.0036f * Checkpoints::kSlotBytes + kPeriod + 2 * kAn
 
 Filter filter{auvest::Ekf<Process>(Process())};
 Checkpoints checkpoints(kKind);
+AUVEST_EEPROM_INTERRUPT(checkpoints)
 auvest_board::SerialInstruments instruments;
 Telemetry telemetry;
 Sample sample;
@@ -123,7 +124,7 @@ AUVEST_OUTLINE void save() {
       checkpoints.begin(filter, {sample.time.seconds, microseconds, start, clock});
   if (sequence == 0) return;  // the one before is still being written
   since_checkpoint = 0;
-  Telemetry::saving(sequence, sample.time.seconds, checkpoints.sum());
+  Telemetry::saving(sequence, checkpoints.sum());
 }
 
 void setup() {

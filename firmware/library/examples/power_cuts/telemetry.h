@@ -41,15 +41,15 @@ class Telemetry {
     line.finish();
   }
 
-  /// $RESUME,sequence,seconds,sum,least,most,status,x,y: from which checkpoint, how old it is, and
-  /// where the craft was. Sequence 0: from none.
+  /// $RESUME,sequence,seconds,sum,least,most,status,x,y: from which checkpoint (its CRC-32 as 8
+  /// hexadecimal digits), how old it is, and where the craft was. Sequence 0: from none.
   static void resumed(const auvest::Resumed& resumed, uint32_t sum, const Age& age,
                       const Filter& filter) {
     auvest_board::LineOut line;
     line.start("RESUME");
     line.field(resumed.sequence);
     line.field(resumed.time.seconds);
-    line.field(sum);
+    line.field(auvest::math::from_bits(sum));
     line.field(age.least);
     line.field(age.most);
     line.field(static_cast<uint32_t>(resumed.status));
@@ -57,13 +57,12 @@ class Telemetry {
     line.finish();
   }
 
-  /// $SAVE,sequence,seconds,sum: a checkpoint has begun.
-  static void saving(uint32_t sequence, uint32_t seconds, uint32_t sum) {
+  /// $SAVE,sequence,sum: a checkpoint has begun.
+  static void saving(uint32_t sequence, uint32_t sum) {
     auvest_board::LineOut line;
     line.start("SAVE");
     line.field(sequence);
-    line.field(seconds);
-    line.field(sum);
+    line.field(auvest::math::from_bits(sum));
     line.finish();
   }
 
