@@ -128,7 +128,7 @@ WRONG = ("mixes", "older", "other_state", "age_wrong")
 
 
 @dataclass
-class _Begun:
+class Begun:
     """A checkpoint as the sketch announced it."""
 
     sequence: int
@@ -138,12 +138,14 @@ class _Begun:
 
 
 @dataclass
-class _History:
+class History:
+    """What the desk knows of the EEPROM, from what the sketch said and how long it lived."""
+
     now_s: float = 1000.0
-    begun: list[_Begun] = field(default_factory=list)
-    complete: _Begun | None = None  #: the newest that must be whole
-    under_way: _Begun | None = None  #: begun after that, in this life
-    torn: _Begun | None = None  #: begun after that, and cut
+    begun: list[Begun] = field(default_factory=list)
+    complete: Begun | None = None  #: the newest that must be whole
+    under_way: Begun | None = None  #: begun after that, in this life
+    torn: Begun | None = None  #: begun after that, and cut
 
 
 def attack(
@@ -157,7 +159,7 @@ def attack(
 ) -> Found:
     """Cut the power of a board with the sketch ``power_cuts`` so often, and let it start again."""
     dice = random.Random(seed)
-    found, history, craft = Found(), _History(), Craft()
+    found, history, craft = Found(), History(), Craft()
     with tempfile.TemporaryDirectory() as folder:
         eeprom, clock = Path(folder) / "eeprom", False
         for cut in range(cuts):
@@ -177,7 +179,7 @@ def _live(
     seed: int,
     clock: bool,
     before: Checkpoint | None,
-    history: _History,
+    history: History,
     craft: Craft,
     found: Found,
     runner: Path | None,
@@ -204,11 +206,11 @@ def _live(
             if kind == "RESUME":
                 resumed = True
                 belief_s = at_s
-                _judge(cells, at_s, clock, before, history, found)
+                judge(cells, at_s, clock, before, history, found)
             else:
                 _complete(history, at_s)
                 history.torn = None  # what is written now takes its slot
-                begun = _Begun(int(cells[0]), int(cells[1], 16), belief_s, at_s)
+                begun = Begun(int(cells[0]), int(cells[1], 16), belief_s, at_s)
                 history.begun.append(begun)
                 history.under_way = begun
     found.cut_before_resuming += not resumed
@@ -218,24 +220,29 @@ def _live(
     history.under_way = None
 
 
-def _complete(history: _History, at_s: float) -> None:
+def _complete(history: History, at_s: float) -> None:
     """By now, what was begun in this life may be whole."""
     begun = history.under_way
     if begun is not None and at_s > begun.announced_s + SLOT * BYTE_S:
         history.complete, history.under_way = begun, None
 
 
-def _judge(
+def number(bits: str) -> float:
+    """Read a float of 8 hexadecimal digits."""
+    return struct.unpack(">f", bytes.fromhex(bits))[0]
+
+
+def judge(
     cells: Sequence[str],
     at_s: float,
     clock: bool,
     before: Checkpoint | None,
-    history: _History,
+    history: History,
     found: Found,
 ) -> None:
     """Hold what a start has resumed from against what was there."""
     sequence, total = int(cells[0]), int(cells[2], 16)
-    least, most, x, y = (struct.unpack(">f", bytes.fromhex(cells[i]))[0] for i in (3, 4, 6, 7))
+    least, most, x, y = (number(cells[i]) for i in (3, 4, 6, 7))
     torn, complete = history.torn, history.complete
     if sequence == 0:
         found.resumed_none += 1
