@@ -9,6 +9,9 @@ stack that reaches the data. Program and world are in lock-step, so a run is det
             if isinstance(event, SerialLine) and event.text.startswith("?"):
                 board.send("12.5,0.31", delay_s=0.02)
     print(board.report.awake_share)
+
+The power can be cut: what the EEPROM held is in the file ``eeprom``, and another `Board` with the
+same file starts from it; all else is lost. A byte that was being written reads back as anything.
 """
 
 from __future__ import annotations
@@ -105,7 +108,7 @@ class Report:
     Attributes
     ----------
     reason : str
-        Why it ended: finished, elapsed or stopped; or, as a failure, failed, crashed, reset,
+        Why it ended: finished, elapsed, stopped or cut; or, as a failure, failed, crashed, reset,
         illegal access, stack overflow or limit.
     message : str
         What happened and where, for a failure.
@@ -269,6 +272,15 @@ class Board:
         File of the bytes for ``board::read``.
     output : path, optional
         File for the bytes from ``board::write``, written at the end.
+    eeprom : path, optional
+        File of what the EEPROM holds, read at the start and written at the end. One that is not
+        there is erased memory.
+    reset_cause : str
+        What the program's MCUSR says: ``power-on``, ``external``, ``brown-out`` or ``watchdog``.
+    cut_cycle : int, optional
+        The cycle in which the power goes off; see also `cut`.
+    seed : int
+        Decides what a byte of EEPROM that is being written at a cut reads back as.
 
     Raises
     ------
@@ -290,6 +302,10 @@ class Board:
         frequency_hz: int = 16_000_000,
         input: str | os.PathLike[str] | None = None,
         output: str | os.PathLike[str] | None = None,
+        eeprom: str | os.PathLike[str] | None = None,
+        reset_cause: str = "power-on",
+        cut_cycle: int | None = None,
+        seed: int = 1,
     ) -> None:
         if isinstance(watch, str):
             raise ValueError(f"watch must be a sequence of pins; got the string {watch!r}")
@@ -308,6 +324,11 @@ class Board:
             self._command += ["--input", os.fspath(input)]
         if output is not None:
             self._command += ["--output", os.fspath(output)]
+        if eeprom is not None:
+            self._command += ["--eeprom", os.fspath(eeprom)]
+        self._command += ["--reset-cause", reset_cause, "--seed", str(seed)]
+        if cut_cycle is not None:
+            self._command += ["--cut", str(cut_cycle)]
         self._command += ["--", os.fspath(elf)]
         self._process: subprocess.Popen[bytes] | None = None
         self._waiting = False  # the runner waits for commands
@@ -372,6 +393,24 @@ class Board:
             raise ValueError(f"text must have one byte per character; got {text!r}") from None
         delay = as_number("delay_s", delay_s, "not negative")
         self._write(f"send {round(delay * self.frequency_hz)} {text}", keep_waiting=True)
+
+    def cut(self, delay_s: float = 0.0) -> None:
+        """Cut the power: the run ends, as ``cut``, and what the EEPROM holds is kept.
+
+        Parameters
+        ----------
+        delay_s : float
+            From the event being handled to the cut. It takes the place of one planned before.
+
+        Raises
+        ------
+        ValueError
+            If the delay is negative.
+        RuntimeError
+            If the run is over.
+        """
+        delay = as_number("delay_s", delay_s, "not negative")
+        self._write(f"cut {round(delay * self.frequency_hz)}", keep_waiting=True)
 
     def run(self) -> Report:
         """Let the program run to its end; nobody reacts to it.

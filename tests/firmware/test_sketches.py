@@ -15,7 +15,7 @@ from firmware import replay_record
 pytest_plugins = ["board_support"]
 
 EXAMPLES = "firmware/library/examples"
-SKETCHES = ["first_steps", "mission", "replay", "slave_tracking", "tracking_loop"]
+SKETCHES = ["first_steps", "mission", "power_cuts", "replay", "slave_tracking", "tracking_loop"]
 
 
 @pytest.fixture(scope="session")

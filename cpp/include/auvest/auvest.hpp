@@ -3,6 +3,9 @@
 
 #include "auvest/config.hpp"  // first: it says what is wrong with a compiler
 
+#include "auvest/board/array_store.hpp"
+#include "auvest/board/checkpoint.hpp"
+#include "auvest/board/checkpoint_ring.hpp"
 #include "auvest/board/crc32.hpp"
 #include "auvest/board/line.hpp"
 #include "auvest/control/autopilot.hpp"
@@ -22,6 +25,7 @@
 #include "auvest/filters/gaussian_sum.hpp"
 #include "auvest/filters/imm.hpp"
 #include "auvest/filters/late_updates.hpp"
+#include "auvest/filters/predict_within.hpp"
 #include "auvest/filters/robust.hpp"
 #include "auvest/filters/robust_ekf.hpp"
 #include "auvest/filters/ukf.hpp"

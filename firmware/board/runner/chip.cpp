@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <new>
+#include <random>
 #include <stdexcept>
 
 namespace auvest_board {
@@ -16,8 +17,12 @@ constexpr avr_io_addr_t kGpior0 = 0x3e;
 constexpr avr_io_addr_t kGpior1 = 0x4a;
 constexpr avr_io_addr_t kGpior2 = 0x4b;
 constexpr avr_io_addr_t kSmcr = 0x53;
+constexpr avr_io_addr_t kMcusr = 0x54;
+constexpr avr_io_addr_t kWdtcsr = 0x60;
 constexpr uint8_t kSleepEnable = 0x01;
 constexpr uint8_t kSleepMode = 0x0e;
+constexpr uint8_t kWatchdogEnable = 0x08;
+constexpr uint8_t kWatchdogChange = 0x10;
 
 constexpr uint8_t kFinishMark = 0xff;
 constexpr uint8_t kFailMark = 0xfe;
@@ -64,6 +69,8 @@ const char* name(Reason reason) {
       return "elapsed";
     case Reason::kStopped:
       return "stopped";
+    case Reason::kCut:
+      return "cut";
     case Reason::kFailed:
       return "failed";
     case Reason::kCrashed:
@@ -81,13 +88,18 @@ const char* name(Reason reason) {
 }
 
 bool is_failure(Reason reason) {
-  return reason != Reason::kFinished && reason != Reason::kElapsed && reason != Reason::kStopped;
+  return reason != Reason::kFinished && reason != Reason::kElapsed && reason != Reason::kStopped &&
+         reason != Reason::kCut;
 }
 
 // ---- Set-up -------------------------------------------------------------------------------------
 
 Chip::Chip(Program& program, World& world, const ChipOptions& options)
-    : program_(program), world_(world), at_limit_(options.at_limit), input_(options.input) {
+    : program_(program),
+      world_(world),
+      seed_(options.seed),
+      at_limit_(options.at_limit),
+      input_(options.input) {
   logging_chip = this;
   avr_global_logger_set(on_log);
   avr_ = make_avr(options);
@@ -105,7 +117,10 @@ Chip::Chip(Program& program, World& world, const ChipOptions& options)
   lowest_ = window_lowest_ = stack_pointer();
 
   uart_ = std::make_unique<Uart>(avr_, [this](Cycle when, uint8_t byte) { on_serial(when, byte); });
+  eeprom_ = std::make_unique<Eeprom>(avr_, options.eeprom);
   connect_registers();
+  start_by(options.cause);
+  if (options.cut != 0) cut_after(options.cut);
   for (const std::string& pin : options.watched_pins) watch(pin);
   avr_cycle_timer_register(
       avr_, options.limit,
@@ -141,6 +156,28 @@ void Chip::connect_registers() {
           return 0;
         }
         return static_cast<uint8_t>(chip->input_[chip->input_read_++]);
+      },
+      this);
+}
+
+/// A watchdog that has reset the chip goes on, with its shortest time.
+void Chip::start_by(ResetCause cause) {
+  avr_->data[kMcusr] = static_cast<uint8_t>(cause);
+  if (cause != ResetCause::kWatchdog) return;
+  const auto& watchdog = avr_->io[AVR_DATA_TO_IO(kWdtcsr)].w;
+  for (const uint8_t value : {uint8_t(kWatchdogChange | kWatchdogEnable), kWatchdogEnable}) {
+    watchdog.c(avr_, kWdtcsr, value, watchdog.param);
+  }
+}
+
+/// Replaces a cut that was planned before.
+void Chip::cut_after(Cycle delay) {
+  avr_cycle_timer_register(
+      avr_, delay,
+      [](avr_t*, avr_cycle_count_t, void* self) -> avr_cycle_count_t {
+        auto* chip = static_cast<Chip*>(self);
+        chip->stop(Reason::kCut, "the power was cut" + chip->where());
+        return 0;
       },
       this);
 }
@@ -200,7 +237,12 @@ Outcome Chip::run() {
     }
     if (avr_->run != unhindered) stop(Reason::kReset, "reset by the watchdog" + where());
   }
-  if (outcome_.reason != Reason::kStopped) uart_->drain();  // else the world is gone
+  if (outcome_.reason == Reason::kCut) {
+    eeprom_->cut(static_cast<uint8_t>(std::mt19937(seed_)()));
+  } else {
+    eeprom_->finish();
+    if (outcome_.reason != Reason::kStopped) uart_->drain();  // else the world is gone
+  }
   close_stack_window(stack_pointer());
   return outcome_;
 }
@@ -220,6 +262,10 @@ void Chip::tell(const Event& event) {
   const Reaction reaction = world_.react(event);
   for (const Message& message : reaction.messages) {
     uart_->send(event.cycle + message.delay, message.text + '\n');
+  }
+  if (reaction.cut) {
+    const Cycle when = event.cycle + reaction.cut_delay;
+    cut_after(when > avr_->cycle ? when - avr_->cycle : 0);
   }
   if (reaction.stop) stop(Reason::kStopped, "stopped from outside");
 }

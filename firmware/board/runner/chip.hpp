@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "eeprom.hpp"
 #include "program.hpp"
 #include "sections.hpp"
 #include "simavr.hpp"
@@ -19,6 +20,7 @@ enum class Reason {
   kFinished,  ///< board::finish()
   kElapsed,   ///< the time asked for has passed
   kStopped,   ///< by the world
+  kCut,       ///< the power went off
   kFailed,    ///< board::fail()
   kCrashed,
   kReset,
@@ -36,6 +38,9 @@ struct Outcome {
   std::string message;
 };
 
+/// Why the chip starts, as MCUSR says it.
+enum class ResetCause : uint8_t { kPowerOn = 1, kExternal = 2, kBrownOut = 4, kWatchdog = 8 };
+
 struct PinChange {
   Cycle cycle;
   std::string pin;
@@ -49,6 +54,10 @@ struct ChipOptions {
   Reason at_limit = Reason::kLimit;
   std::vector<std::string> watched_pins;  ///< "PORTB7", or "all"
   std::string input;                      ///< for board::read
+  ResetCause cause = ResetCause::kPowerOn;
+  std::string eeprom;  ///< what it holds at the start; see Eeprom
+  Cycle cut = 0;       ///< when the power goes off, if it does (not 0)
+  uint32_t seed = 1;   ///< of the value that a byte of EEPROM under way then has
 };
 
 class Chip {
@@ -74,6 +83,7 @@ class Chip {
   const std::string& output() const { return output_; }  ///< from board::write
   const std::string& serial() const { return serial_; }  ///< all bytes sent by USART0
   uint64_t serial_overruns() const { return uart_->overruns(); }
+  std::string eeprom() const { return eeprom_->content(); }
 
  private:
   struct Pin {
@@ -83,6 +93,8 @@ class Chip {
   };
 
   void watch(const std::string& pin);
+  void start_by(ResetCause cause);
+  void cut_after(Cycle delay);
   void connect_registers();
   void tell(const Event& event);
   void on_serial(Cycle when, uint8_t byte);
@@ -105,6 +117,8 @@ class Chip {
   World& world_;
   avr_t* avr_;
   std::unique_ptr<Uart> uart_;
+  std::unique_ptr<Eeprom> eeprom_;
+  uint32_t seed_;
   Reason at_limit_;
   bool stopped_ = false;
   Outcome outcome_{Reason::kCrashed, "simavr stopped"};

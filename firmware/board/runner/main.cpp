@@ -37,6 +37,11 @@ Runs an AVR program on a simulated chip until it calls board::finish().
   --answers FILE    CSV, columns delay_ms,text: answers to the chip's requests on USART0
   --request PREFIX  how a request begins (?)
   --interactive     the world is played through stdin and stdout (protocol: runner/world.hpp)
+  --eeprom FILE     what the EEPROM holds, kept there at the end; a file that is not there is erased
+                    memory
+  --reset-cause WHY what MCUSR says: power-on (the default), external, brown-out or watchdog
+  --cut CYCLE       the power goes off then; that is success
+  --seed N          decides what a byte of EEPROM that is being written then reads back as (1)
   --watch PIN       record the changes of a pin like PORTB7, or of all; may be repeated
   --report FILE     JSON: outcome, cycles, sections, stack, heap, pins
 )";
@@ -48,7 +53,7 @@ struct UsageError : std::runtime_error {
 struct Options {
   ChipOptions chip;
   double limit_s = 60;
-  std::string input, output, serial, answers, report, program;
+  std::string input, output, serial, answers, report, eeprom, program;
   std::string request = "?";
   bool interactive = false;
   bool help = false;
@@ -63,15 +68,42 @@ double positive(const std::string& option, const char* text) {
   return value;
 }
 
+uint64_t whole(const std::string& option, const char* text) {
+  char* end = nullptr;
+  const uint64_t value = std::strtoull(text, &end, 10);
+  if (*text < '0' || *text > '9' || *end != '\0') {
+    throw UsageError("--" + option + " must be a whole number; got " + text);
+  }
+  return value;
+}
+
+ResetCause reset_cause(const std::string& name) {
+  if (name == "power-on") return ResetCause::kPowerOn;
+  if (name == "external") return ResetCause::kExternal;
+  if (name == "brown-out") return ResetCause::kBrownOut;
+  if (name == "watchdog") return ResetCause::kWatchdog;
+  throw UsageError("--reset-cause must be power-on, external, brown-out or watchdog; got " + name);
+}
+
 Options parse(int argc, char** argv) {
-  const option known[] = {
-      {"mcu", required_argument, nullptr, 'm'},     {"frequency", required_argument, nullptr, 'f'},
-      {"limit", required_argument, nullptr, 'l'},   {"for", required_argument, nullptr, 't'},
-      {"input", required_argument, nullptr, 'i'},   {"output", required_argument, nullptr, 'o'},
-      {"serial", required_argument, nullptr, 's'},  {"answers", required_argument, nullptr, 'a'},
-      {"request", required_argument, nullptr, 'q'}, {"interactive", no_argument, nullptr, 'x'},
-      {"watch", required_argument, nullptr, 'w'},   {"report", required_argument, nullptr, 'r'},
-      {"help", no_argument, nullptr, 'h'},          {nullptr, 0, nullptr, 0}};
+  const option known[] = {{"mcu", required_argument, nullptr, 'm'},
+                          {"frequency", required_argument, nullptr, 'f'},
+                          {"limit", required_argument, nullptr, 'l'},
+                          {"for", required_argument, nullptr, 't'},
+                          {"input", required_argument, nullptr, 'i'},
+                          {"output", required_argument, nullptr, 'o'},
+                          {"serial", required_argument, nullptr, 's'},
+                          {"answers", required_argument, nullptr, 'a'},
+                          {"request", required_argument, nullptr, 'q'},
+                          {"interactive", no_argument, nullptr, 'x'},
+                          {"watch", required_argument, nullptr, 'w'},
+                          {"report", required_argument, nullptr, 'r'},
+                          {"eeprom", required_argument, nullptr, 'e'},
+                          {"cut", required_argument, nullptr, 'c'},
+                          {"seed", required_argument, nullptr, 'd'},
+                          {"reset-cause", required_argument, nullptr, 'p'},
+                          {"help", no_argument, nullptr, 'h'},
+                          {nullptr, 0, nullptr, 0}};
   Options options;
   for (int c; (c = getopt_long(argc, argv, "h", known, nullptr)) != -1;) {
     switch (c) {
@@ -111,6 +143,18 @@ Options parse(int argc, char** argv) {
         break;
       case 'r':
         options.report = optarg;
+        break;
+      case 'e':
+        options.eeprom = optarg;
+        break;
+      case 'c':
+        options.chip.cut = whole("cut", optarg);
+        break;
+      case 'd':
+        options.chip.seed = static_cast<uint32_t>(whole("seed", optarg));
+        break;
+      case 'p':
+        options.chip.cause = reset_cause(optarg);
         break;
       case 'h':
         options.help = true;
@@ -158,9 +202,14 @@ int run(int argc, char** argv) {
   }
   Program program(options.program);
   if (!options.input.empty()) options.chip.input = read_file(options.input);
+  if (!options.eeprom.empty() && std::ifstream(options.eeprom)) {
+    options.chip.eeprom = read_file(options.eeprom);
+  }
   const std::unique_ptr<World> world = make_world(options);
   Chip chip(program, *world, options.chip);
   const Outcome outcome = chip.run();
+
+  if (!options.eeprom.empty()) write_file(options.eeprom, chip.eeprom());
 
   const std::string json = report(chip, outcome, options.chip.frequency);
   if (options.interactive) std::cout << "report " << json << std::endl;

@@ -2,8 +2,10 @@
 #pragma once
 
 extern "C" {
+#include <avr_eeprom.h>
 #include <avr_ioport.h>
 #include <avr_uart.h>
+#include <avr_watchdog.h>
 #include <sim_avr.h>
 #include <sim_core.h>
 #include <sim_cycle_timers.h>

@@ -68,7 +68,13 @@ Reaction InteractiveWorld::react(const Event& event) {
     std::istringstream words(command);
     std::string verb;
     Message message{};
-    if (!(words >> verb >> message.delay) || verb != "send" || words.get() != ' ') {
+    words >> verb >> message.delay;
+    if (words && verb == "cut") {
+      reaction.cut = true;
+      reaction.cut_delay = message.delay;
+      continue;
+    }
+    if (!words || verb != "send" || words.get() != ' ') {
       throw std::runtime_error("--interactive: unknown command: " + command);
     }
     std::getline(words, message.text);

@@ -25,7 +25,9 @@ struct Message {
 
 struct Reaction {
   std::vector<Message> messages;
-  bool stop = false;  ///< end the run here
+  bool stop = false;    ///< end the run here
+  bool cut = false;     ///< the power goes off ...
+  Cycle cut_delay = 0;  ///< ... this long after the event
 };
 
 class World {
@@ -63,6 +65,7 @@ class AnswersWorld : public World {
 /// After each the chip stands still until `go`; before it may come any number of
 ///
 ///     send DELAY TEXT         send TEXT and a newline, beginning DELAY cycles after the event
+///     cut DELAY               the power goes off DELAY cycles after the event
 ///
 /// `stop` instead of `go`, or the end of stdin, ends the run. The last line on stdout is the
 /// report, one line of JSON: report {...}

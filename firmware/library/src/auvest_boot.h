@@ -59,21 +59,23 @@ class BootCount {
     return sum.value();
   }
 
-  /// 0 where nothing whole is stored.
+  /// 0 where nothing whole is stored. Erased memory, all ones, has the sum of what it is.
   static uint32_t stored(uint8_t i) {
     Slot slot;
     eeprom_read_block(&slot, place(i), sizeof slot);
-    return slot.sum == sum_of(slot.count) ? slot.count : 0;
+    return slot.count != 0xffffffff && slot.sum == sum_of(slot.count) ? slot.count : 0;
   }
 };
 
-/// Sends the line. After Serial.begin(), before all else.
-inline void announce_boot() {
+/// Sends the line, and gives the count. After Serial.begin(), before all else.
+inline uint32_t announce_boot() {
+  const uint32_t count = BootCount().next();
   LineOut line;
   line.start("BOOT");
-  line.field(BootCount().next());
+  line.field(count);
   line.field(static_cast<uint32_t>(reset_cause));
   line.finish();
+  return count;
 }
 
 }  // namespace auvest_board

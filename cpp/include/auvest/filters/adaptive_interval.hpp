@@ -61,6 +61,9 @@ class AdaptiveInterval : public Filter {
     return Status::kOk;
   }
 
+  /// As above with policy and interval as they stand.
+  Status restore(const BeliefType& belief) { return restore(belief, Policy(policy_), interval_); }
+
   /// Chooses the interval to the next sample; `reference` is the desired position (m) now.
   Status feedback(const Position& reference) {
     if (!this->initialised()) return Status::kNotInitialised;
