@@ -170,12 +170,21 @@ class LateUpdates {
  public:
   using Memory = LateMemory<Filter, Sensor, EventArray<LateEvent<Filter, Sensor>, Capacity>>;
   using Scalar = typename Filter::Scalar;
+  using State = typename Filter::State;
+  using Covariance = typename Filter::Covariance;
   using Input = typename Memory::Input;
   using Measurement = typename Memory::Measurement;
   using Report = typename Memory::Report;
 
   /// Goes on from where `filter` is.
-  explicit LateUpdates(const Filter& filter) : filter_(filter), memory_(filter) {}
+  explicit LateUpdates(const Filter& filter = Filter()) : filter_(filter), memory_(filter) {}
+
+  /// Sets the belief, as the filter does; everything before is forgotten.
+  Status reset(const State& x0, const Covariance& P0) {
+    const Status status = filter_.reset(x0, P0);
+    if (status == Status::kOk) memory_.restart(filter_);
+    return status;
+  }
 
   /// Carries the filter dt >= 0 seconds forward with this input.
   Status predict(Scalar dt, const Input& input) { return memory_.predict(filter_, dt, input); }
@@ -183,6 +192,15 @@ class LateUpdates {
   /// Corrects by what was measured `age` >= 0 seconds ago. On anything but kOk nothing has changed.
   Report update(const Measurement& z, const Sensor& sensor, Scalar age = Scalar(0)) {
     return memory_.update(filter_, z, sensor, age);
+  }
+
+  /// As above, by one number, or by an expression of as many as the sensor measures.
+  Report update(Scalar z, const Sensor& sensor, Scalar age = Scalar(0)) {
+    return update(MeasurementOf<Sensor>::from(z), sensor, age);
+  }
+  template <class Z>
+  Report update(const Eigen::MatrixBase<Z>& z, const Sensor& sensor, Scalar age = Scalar(0)) {
+    return update(MeasurementOf<Sensor>::from(z), sensor, age);
   }
 
   const Filter& filter() const { return filter_; }
