@@ -5,6 +5,7 @@
 
 #include "auvest/board/crc32.hpp"
 #include "auvest/board/line.hpp"
+#include "auvest/board/plausible.hpp"
 #include "auvest/control/autopilot.hpp"
 #include "auvest/control/depth_control.hpp"
 #include "auvest/control/heading_control.hpp"
