@@ -37,22 +37,8 @@ constexpr uint32_t kTicks = wake_timer::to_ticks(kPeriod);
 constexpr uint32_t kTolerance = wake_timer::to_ticks(0.001f);
 constexpr uint32_t kPause = wake_timer::to_ticks(0.05f);  // enough to look at the RAM
 
-Process::Params readings_noise() {
-  Process::Params params;
-  params.sigma_forward = kSigmaSpeed;
-  params.sigma_heading = kSigmaHeading;
-  return params;
-}
-
-Filter make_filter() {
-  auvest::Igg<float>::Params kernel;
-  kernel.k0 = kDoubt;
-  kernel.k1 = kGate;
-  return Filter(Process(readings_noise()), Filter::Rule(auvest::Igg<float>(kernel)));
-}
-
 // All objects are global: what they take is known before the sketch runs.
-Late late(make_filter());
+Late late;
 Instruments instruments;
 auvest::PlausibleReading<float> speed, heading, ranges[kBeaconCount];
 Telemetry telemetry;

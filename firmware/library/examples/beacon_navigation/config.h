@@ -3,10 +3,6 @@
 
 #include <auvest.h>
 
-/// Dead reckoning by speed and heading; x is north, y is east, the heading clockwise from north.
-using Process = auvest::SpeedHeading<float>;
-using Filter = auvest::RobustEkf<Process>;
-
 /// Where the beacons are, m.
 constexpr float kBeacons[3][2] = {{0, 0}, {120, 0}, {60, 90}};
 constexpr uint8_t kBeaconCount = 3;
@@ -30,9 +26,9 @@ constexpr float kCruiseHeading = 0;
 /// From the moment of the sample to the last character of the reading, s.
 constexpr float kReadingTimeout = 0.1f;
 
-/// Predictions and ranges that are kept: a range may be as late as half of them have periods. Each
-/// takes 45 bytes.
-constexpr int kKeptEvents = 10;
+/// Predictions and ranges that are kept, 45 bytes each: with 6, which an UNO has room for, a range
+/// may be 3 samples late, and mostly 5. A MEGA2560 has room for a hundred.
+constexpr int kKeptEvents = 6;
 
 /// No reading or range can be beyond these: m/s, m/s^2, rad/s, m.
 constexpr float kFastest = 3;
@@ -44,6 +40,23 @@ constexpr float kLargestRange = 500;
 /// that agree say that the estimate is wrong: then the filter recovers.
 constexpr float kDoubt = 1.5f;
 constexpr float kGate = 3;
+
+/// Dead reckoning by speed and heading; x is north, y is east, the heading clockwise from north.
+struct Process : auvest::SpeedHeading<float> {
+  Process() {
+    params.sigma_forward = kSigmaSpeed;
+    params.sigma_heading = kSigmaHeading;
+  }
+};
+
+struct Kernel : auvest::Igg<float> {
+  Kernel() {
+    params.k0 = kDoubt;
+    params.k1 = kGate;
+  }
+};
+
+using Filter = auvest::RobustEkf<Process, Kernel>;
 
 /// Floats are sent as their bits, 8 hexadecimal digits. false: with 3 decimals, to be read in the
 /// Serial Monitor.
