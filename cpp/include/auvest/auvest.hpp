@@ -20,6 +20,7 @@
 #include "auvest/filters/aukf.hpp"
 #include "auvest/filters/ckf.hpp"
 #include "auvest/filters/ekf.hpp"
+#include "auvest/filters/gated.hpp"
 #include "auvest/filters/gaussian_sum.hpp"
 #include "auvest/filters/imm.hpp"
 #include "auvest/filters/late_updates.hpp"

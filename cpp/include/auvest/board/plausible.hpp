@@ -10,6 +10,8 @@
 // then: a wrong one, even the first, shuts nobody out for long.
 #pragma once
 
+#include <limits>
+
 #include "auvest/math/angle.hpp"
 #include "auvest/math/basic.hpp"
 
@@ -47,23 +49,20 @@ class PlausibleReading {
 
   bool admits(Scalar value, const ReadingLimits<Scalar>& limits) const {
     if (!math::within(value, limits.smallest, limits.largest)) return false;
-    if (!known_) return true;
     Scalar change = value - last_;
     if (limits.comes_round) change = math::wrap(change);
-    return math::absolute(change) <= limits.jitter + limits.fastest * since_;
+    return !(math::absolute(change) > limits.jitter + limits.fastest * since_);
   }
 
   /// Changes count from this value, now.
   void take(Scalar value) {
     last_ = value;
     since_ = Scalar(0);
-    known_ = true;
   }
 
  private:
   Scalar last_ = Scalar(0);
-  Scalar since_ = Scalar(0);
-  bool known_ = false;
+  Scalar since_ = std::numeric_limits<Scalar>::infinity();  // never
 };
 
 }  // namespace AUVEST_INSTRUCTIONS
