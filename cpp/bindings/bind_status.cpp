@@ -18,7 +18,8 @@ void bind_status(py::module_& m) {
       .value("step_too_long", Status::kStepTooLong)
       .value("impossible_range", Status::kImpossibleRange)
       .value("far_from_origin", Status::kFarFromOrigin)
-      .value("recoveries_repeat", Status::kRecoveriesRepeat);
+      .value("recoveries_repeat", Status::kRecoveriesRepeat)
+      .value("implausible", Status::kImplausible);
   m.def("describe", static_cast<const char* (*)(Status)>(&describe), py::arg("status"),
         "One line of English for a status.");
 

@@ -44,6 +44,7 @@ class Status(_Enum):
     impossible_range: ClassVar[Status]
     far_from_origin: ClassVar[Status]
     recoveries_repeat: ClassVar[Status]
+    implausible: ClassVar[Status]
     __members__: ClassVar[dict[str, Status]]
 
 class StatusError(ValueError):

@@ -4,6 +4,7 @@ A test file takes the fixtures with ``pytest_plugins = ["closed_loop_support"]``
 """
 
 import contextlib
+import copy
 import math
 from dataclasses import dataclass, field
 from functools import partial
@@ -19,6 +20,7 @@ from auvest.simulation.tracking import Track
 pytest_plugins = ["board_support"]
 
 TICKS_PER_S = 250_000
+IMPLAUSIBLE = 14  # of Status in auvest/status.hpp
 START = ("x_m", "y_m", "vx_m_s", "vy_m_s", "ax_m_s2", "ay_m_s2")
 
 
@@ -109,6 +111,7 @@ def on_the_desk():
             dtype="float32",
         )
         rows, ticks, late = [], 0, 0
+        taken_m, taken_s = 0.0, -math.inf
         for k, row in enumerate(run.rows):
             due = round_to_ticks(filter_.interval)
             now = round(row["time_s"] * TICKS_PER_S)
@@ -120,12 +123,20 @@ def on_the_desk():
                 dt = float(np.float32(now - ticks) * np.float32(1 / TICKS_PER_S))
             ticks, late = now, row["late"]
             filter_.predict(dt)
-            nis, status = math.nan, filter_.status
+            nis, status = math.nan, 0
             if math.isfinite(row["range_m"]):
+                z = row["range_m"], row["bearing_rad"]
+                corrected = copy.copy(filter_)
                 with contextlib.suppress(FilterError):
-                    filter_.update([row["range_m"], row["bearing_rad"]])
-                    nis = filter_.nis
-                status = filter_.status
+                    corrected.update(z)
+                    nis = corrected.nis
+                status = int(corrected.status)
+                reach = 2.0 + 10.0 * (row["time_s"] - taken_s)
+                jumped = abs(z[0] - taken_m) > reach or abs(z[1]) > 6.2842
+                if status == 0 and (jumped or nis > 13.8):
+                    status, nis = IMPLAUSIBLE, math.nan if jumped else nis
+                if status == 0:
+                    filter_, taken_m, taken_s = corrected, z[0], row["time_s"]
             position = desired(ticks)
             filter_.feedback(position)
             expected = {
@@ -135,7 +146,7 @@ def on_the_desk():
                 "desired_y_m": float(position[1]),
                 **dict(zip(START, filter_.x.tolist(), strict=True)),
                 "nis": nis,
-                "status": int(status),
+                "status": status,
                 "interval_s": filter_.interval,
             }
             for name in row:

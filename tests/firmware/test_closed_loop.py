@@ -12,6 +12,8 @@ from auvest.cli import app
 
 pytest_plugins = ["closed_loop_support"]
 
+IMPLAUSIBLE = 14  # of Status in auvest/status.hpp
+
 
 def fixed(interval_s):
     """C++ for a policy that always takes this interval."""
@@ -306,6 +308,46 @@ def test_a_range_that_sound_cannot_reach_is_refused_by_the_filter(play, loops, o
     refused = run.column("status") == int(Status.impossible_range)
     assert np.flatnonzero(refused).tolist() == [4, 6]
     assert not run.column("status")[~refused].any()
+
+
+def test_what_cannot_be_is_implausible_and_not_taken(play, loops, on_the_desk):
+    """A jump, a bearing that is none, two beyond the gate: named, counted, predicted only."""
+    sound = noisy_sonar()
+    wrong = {20: (5.0, 0.0), 24: (0.0, 7.0), 28: (1.5, 0.0), 32: (0.0, 0.5)}
+
+    def sonar(sample, r, bearing):
+        more = wrong.get(sample, (0.0, 0.0))
+        if sample in wrong:
+            return [(0.005, telemetry.answer(sample, r + more[0], bearing + more[1]))]
+        return sound(sample, r, bearing)
+
+    run = play(loops("law"), sonar, samples=36)
+    assert_same_bits(run, on_the_desk(run, POLICIES["law"][0]))
+    implausible = run.column("status") == IMPLAUSIBLE
+    assert [k + 1 for k in np.flatnonzero(implausible)] == list(wrong)
+    assert np.diff(run.column("implausible"), prepend=0)[implausible].tolist() == [1, 1, 1, 1]
+    assert run.rows[-1]["implausible"] == len(wrong)
+    nis = run.column("nis")[implausible]
+    assert np.isnan(nis[:2]).all(), "the limits come first"
+    assert (nis[2:] > 13.8).all(), "the gate says by how much"
+
+
+def test_an_estimate_that_is_wrong_is_found_again(play, loops):
+    """A gate alone is a trap: after five refusals in a row the belief is widened, and follows."""
+    sound = noisy_sonar()
+
+    def sonar(sample, r, bearing):
+        return sound(sample, r + (1.8 if sample > 15 else 0.0), bearing)
+
+    run = play(loops("0.5 s"), sonar, samples=40)
+    refused = run.column("status") == IMPLAUSIBLE
+    assert refused[15:20].all(), "the fifth in a row, and the estimate is still believed"
+    assert not refused[23:].any()
+    assert not refused[:15].any()
+    # Where the sonar says that it is.
+    seen = run.column("range_m"), run.column("bearing_rad")
+    away = np.hypot(run.column("x_m") - 0.2, run.column("y_m") - 2.0)
+    assert np.abs(away - seen[0])[30:].max() < 0.3
 
 
 # ---- Text, memory, the command -------------------------------------------------------------------

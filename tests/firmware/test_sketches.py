@@ -15,7 +15,15 @@ from firmware import replay_record
 pytest_plugins = ["board_support"]
 
 EXAMPLES = "firmware/library/examples"
-SKETCHES = ["first_steps", "mission", "power_cuts", "replay", "slave_tracking", "tracking_loop"]
+SKETCHES = [
+    "beacon_navigation",
+    "first_steps",
+    "mission",
+    "power_cuts",
+    "replay",
+    "slave_tracking",
+    "tracking_loop",
+]
 
 
 @pytest.fixture(scope="session")

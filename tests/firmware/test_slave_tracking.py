@@ -239,6 +239,40 @@ def test_what_does_not_come_is_missed_and_nothing_else(build_edited, play, on_th
     assert not run.column("late").any()
 
 
+IMPLAUSIBLE, IMPOSSIBLE_RANGE = 14, 11  # of Status in auvest/status.hpp
+
+
+def test_what_cannot_be_is_named_and_not_taken(build_edited, play, on_the_host):
+    """Beyond a limit of the value or of its change: counted, and as if it had not come."""
+    range_m = float(paper_world().readings["z"][7][0])
+    readings = {3: (25.0, 0.5), 5: (5.0, 30.0), 7: (-21.0, 0.5)}
+    echoes = {4: (460.0, -1.5), 6: (300.0, 7.0), 8: (range_m + 110.0, -1.5)}
+
+    def motion_(sample):
+        if sample not in readings:
+            return motion(sample)
+        speed, heading = readings[sample]
+        return [(0.005, telemetry.frame(f"MOTION,{sample},{speed:.3f},{heading:.4f}"))]
+
+    def echo_(sample):
+        if sample not in echoes:
+            return echo(sample)
+        return [(0.4, telemetry.answer(sample, *echoes[sample]))]
+
+    run = play(build_edited("slave_tracking").elf, 12, motion_, echo_)
+    wrong = [3, 4, 5, 6, 7, 8]
+    assert [row["sample"] for row in run.rows if row["status"]] == wrong
+    assert run.column("implausible").tolist() == [0, 0, 1, 2, 3, 4, 5, 6, 6, 6, 6, 6]
+    named = [IMPOSSIBLE_RANGE if sample == 4 else IMPLAUSIBLE for sample in wrong]
+    assert [run.rows[sample - 1]["status"] for sample in wrong] == named
+    assert not run.column("missed").any()
+    for sample in wrong:
+        assert np.isnan(run.rows[sample - 1]["range_m" if sample % 2 == 0 else "speed_m_s"])
+    heard = [row["sample"] for row in run.rows if np.isfinite(row["range_m"])]
+    assert heard == [2, 10, 12]
+    assert_same_bits(run, on_the_host(run, "slatf2"))
+
+
 def test_late_samples_cover_what_really_passed(build_edited, play, on_the_host):
     """Three readings a second are too many for 48 particles: said so, and still the host's bits."""
     run = play(build_edited("slave_tracking", kPeriod="0.3f").elf, 16)

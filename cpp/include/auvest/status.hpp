@@ -22,7 +22,8 @@ enum class Status : std::uint8_t {
   kStepTooLong,          ///< dt is longer than the filter's longest_step_s: a clock that jumped?
   kImpossibleRange,      ///< a range is negative or outside of what the sensor can measure
   kFarFromOrigin,        ///< coordinates so large that the format is coarse against the sigmas
-  kRecoveriesRepeat      ///< the recovery has widened the belief too often: the model is wrong
+  kRecoveriesRepeat,     ///< the recovery has widened the belief too often: the model is wrong
+  kImplausible           ///< a number that the instrument cannot have measured, or beyond the gate
 };
 
 /// One line of English for each status, without a full stop. Short: a chip holds all of them in
@@ -57,6 +58,8 @@ inline const char* describe(Status status) {
       return "too far from the origin";
     case Status::kRecoveriesRepeat:
       return "recoveries repeat";
+    case Status::kImplausible:
+      return "implausible";
   }
   return "unknown status";
 }

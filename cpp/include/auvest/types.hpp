@@ -18,6 +18,16 @@ using Matrix =
 template <class Scalar, int Rows>
 using Vector = Matrix<Scalar, Rows, 1>;
 
+/// Whether two types are one (avr-gcc has no <type_traits>).
+template <class A, class B>
+struct IsSame {
+  static constexpr bool value = false;
+};
+template <class A>
+struct IsSame<A, A> {
+  static constexpr bool value = true;
+};
+
 /// Gaussian belief N(x, P). Filters read and write only the lower triangle of P: there is one
 /// number per pair of states, so P cannot become asymmetric.
 template <class Scalar, int N>

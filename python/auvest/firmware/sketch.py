@@ -23,6 +23,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 MEGA2560 = "arduino:avr:mega:cpu=atmega2560"
+UNO = "arduino:avr:uno"
 
 # Debian's core is made for a newer avr-gcc than Debian's: its <float.h> has no DECIMAL_DIG in C++.
 _CORE_NEEDS = "-DDECIMAL_DIG=__DECIMAL_DIG__"

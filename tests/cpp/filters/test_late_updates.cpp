@@ -1,6 +1,7 @@
 // Late measurements end in the bits of the filter that had them in time; the memory is bounded.
 #include <doctest/doctest.h>
 
+#include <initializer_list>
 #include <limits>
 
 #include "auvest/auvest.hpp"
@@ -180,6 +181,47 @@ TEST_CASE("late updates: what is refused changes nothing, then or later") {
   REQUIRE(late.update(range(1), leader(1), 8).status == Status::kOk);
   REQUIRE(other.update(range(1), leader(1), 8).status == Status::kOk);
   CHECK(same(late.filter(), other.filter()));
+}
+
+TEST_CASE("late updates: reset begins anew, whatever was before") {
+  const Vector<float, 2> x(10, -20);
+  const Matrix<float, 2, 2> P = 9 * Matrix<float, 2, 2>::Identity();
+  Late<8> late;
+  CHECK(late.predict(1, motion(0)) == Status::kNotInitialised);
+  CHECK(late.update(250.0f, leader(0)).status == Status::kNotInitialised);
+  REQUIRE(late.reset(Vector<float, 2>(0, 0), P) == Status::kOk);
+  for (int k = 0; k < 4; ++k) REQUIRE(late.predict(1, motion(k)) == Status::kOk);
+  REQUIRE(late.update(range(1), leader(1), 2).status == Status::kOk);
+
+  const Filter before = late.filter();
+  CHECK(late.reset(x, -P) == Status::kNotPositiveDefinite);
+  CHECK(same(late.filter(), before));
+  CHECK(late.update(range(2), leader(2), 1).status == Status::kOk);  // its past is still there
+
+  REQUIRE(late.reset(x, P) == Status::kOk);
+  CHECK(late.update(range(2), leader(2), 1).status == Status::kTimeBackwards);
+  Filter filter;
+  REQUIRE(filter.reset(x, P) == Status::kOk);
+  Late<8> other(filter);
+  for (Late<8>* each : {&late, &other}) {
+    for (int k = 0; k < 4; ++k) REQUIRE(each->predict(1, motion(k)) == Status::kOk);
+    REQUIRE(each->update(range(1), leader(1), 2).status == Status::kOk);
+  }
+  CHECK(same(late.filter(), other.filter()));
+}
+
+TEST_CASE("late updates: a range may be a plain number") {
+  Late<8> a(slave()), b(slave());
+  for (int k = 0; k < 3; ++k) {
+    REQUIRE(a.predict(1, motion(k)) == Status::kOk);
+    REQUIRE(b.predict(1, motion(k)) == Status::kOk);
+  }
+  REQUIRE(a.update(range(1), leader(1), 1).status == Status::kOk);
+  REQUIRE(b.update(range(1)(0), leader(1), 1).status == Status::kOk);
+  CHECK(same(a.filter(), b.filter()));
+  REQUIRE(a.update(range(2), leader(2)).status == Status::kOk);
+  REQUIRE(b.update(0.5f * range(2) + 0.5f * range(2), leader(2)).status == Status::kOk);
+  CHECK(same(a.filter(), b.filter()));
 }
 
 }  // namespace

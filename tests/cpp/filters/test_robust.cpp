@@ -469,4 +469,42 @@ TEST_CASE("robust update: what was saved goes on with the same bits, whatever th
   CHECK(other.rule().recovery.count == 0);
 }
 
+// ---- How a filter is written down ---------------------------------------------------------------
+
+/// From a process alone or from nothing, a filter is that of all its parts; a range may be a plain
+/// number.
+template <class Filter>
+void check_short_forms(Filter whole) {
+  using Process = typename Filter::Process;
+  Filter from_process{Process()};
+  Filter from_nothing;
+  const auvest::LeaderRange<float, 2> beacon;
+  Filter* const filters[] = {&whole, &from_process, &from_nothing};
+  for (Filter* filter : filters) {
+    REQUIRE(filter->reset(Vector<float, 2>(30, -40), Matrix<float, 2, 2>::Identity()) ==
+            Status::kOk);
+    REQUIRE(filter->predict(2.0f, Vector<float, 3>(1.5f, 0.1f, 0.3f)) == Status::kOk);
+    const auto report = filter == &whole ? filter->update(Vector<float, 1>(53.0f), beacon)
+                                         : filter->update(53.0f, beacon);
+    REQUIRE(report.status == Status::kOk);
+    CHECK(report.nis > 0.1f);
+    CHECK(same_bits(filter->x(), whole.x()));
+    CHECK(same_bits(filter->P(), whole.P()));
+  }
+}
+
+TEST_CASE("filters: from a process alone, and from nothing") {
+  using Process = auvest::SpeedHeading<float>;
+  using Inside = auvest::Ekf<Process>;
+  using Rule = auvest::RobustUpdate<auvest::Igg<float>, auvest::RejectionStreak<float>>;
+  using Policy = auvest::MahalanobisInterval<float>;
+  check_short_forms(Inside(Process()));
+  check_short_forms(auvest::Ckf<Process>(Process()));
+  check_short_forms(auvest::Ukf<Process>(Process(), auvest::Ukf<Process>::default_params()));
+  check_short_forms(auvest::RobustEkf<Process>(Inside(Process()), Rule()));
+  check_short_forms(auvest::Aukf<Process>(auvest::Ukf<Process>(Process()), Policy()));
+  check_short_forms(auvest::GaussianSum<auvest::RobustEkf<Process>>(
+      auvest::RobustEkf<Process>(Inside(Process()), Rule())));
+}
+
 }  // namespace

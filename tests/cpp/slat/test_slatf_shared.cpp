@@ -7,9 +7,12 @@
 
 #include <Eigen/LU>
 #include <cmath>
+#include <initializer_list>
 #include <vector>
 
 #include "auvest/slat/ekf_slat.hpp"
+#include "auvest/slat/slatf.hpp"
+#include "auvest/slat/slatf_joint.hpp"
 #include "auvest/slat/slatf_shared.hpp"
 #include "simulation/slat.hpp"
 
@@ -225,6 +228,44 @@ TEST_CASE("SlatfShared: an echo of nobody knows whom is refused, and so are bad 
     Owner<Filter> wrong(Compass<double>(), Master<double>(), 10, params);
     CHECK(wrong.filter.reset(start, random) == Status::kBadParameter);
   }
+}
+
+/// From a storage alone, a filter is that of all its parts.
+template <class Filter>
+void check_from_storage(Filter& short_form, Filter& whole) {
+  for (Filter* filter : {&whole, &short_form}) {
+    Random random(1);
+    typename Filter::SlaveBelief start;
+    start.x.setZero();
+    start.P = Matrix<double, 2, 2>::Identity();
+    REQUIRE(filter->reset(start, random) == Status::kOk);
+    REQUIRE(filter->add_master(master_belief<double>(0, 300, 1, 0, 3)) == Status::kOk);
+    REQUIRE(filter->predict(1, {1.5, 0.2}, random) == Status::kOk);
+    Echo<double> seen;
+    seen.master = 0;
+    seen.z << 302, -1.5;
+    REQUIRE(filter->update(&seen, 1, auvest::Sonar<double>(), random) == Status::kOk);
+    CHECK(filter->slave().x == whole.slave().x);
+    CHECK(filter->master(0).P == whole.master(0).P);
+  }
+  CHECK(whole.slave().x.norm() > 1);
+}
+
+template <class Filter>
+void check_particles_from_storage() {
+  static typename Filter::template Storage<16> first, second;
+  Filter short_form(first);
+  Filter whole(Compass<double>(), Master<double>(), typename Filter::Params(), second);
+  check_from_storage(short_form, whole);
+}
+
+TEST_CASE("filters with echoes: from a storage alone, and from nothing") {
+  using Motion = Compass<double>;
+  check_particles_from_storage<auvest::Slatf1<Motion, Master<double>, 1>>();
+  check_particles_from_storage<auvest::SlatfJoint<Motion, Master<double>, 1>>();
+  check_particles_from_storage<Shared<Motion, 1>>();
+  auvest::EkfSlat<Motion, Master<double>, 1> short_form, whole((Motion()), Master<double>());
+  check_from_storage(short_form, whole);
 }
 
 }  // namespace

@@ -35,6 +35,10 @@ class AdaptiveInterval : public Filter {
         interval_(policy_.initial()),
         policy_check_(Status::kOk) {}
 
+  /// The same of a filter that needs no more than a process.
+  explicit AdaptiveInterval(const typename Filter::Process& process = typename Filter::Process())
+      : Filter(process), policy_(), interval_(policy_.initial()), policy_check_(Status::kOk) {}
+
   /// Sets the belief and starts the policy; `reference` is the desired position (m) at step 0.
   Status reset(const State& x0, const Covariance& P0, const Position& reference) {
     if (!math::all_finite(reference)) return Status::kNotFinite;

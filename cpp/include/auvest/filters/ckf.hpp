@@ -70,7 +70,8 @@ class Ckf : public SigmaPointFilter<Process, CubaturePoints<typename Process::Sc
   using Base = SigmaPointFilter<Process, CubaturePoints<typename Process::Scalar>>;
   using typename Base::Scalar;
 
-  explicit Ckf(const Process& process) : Base(process, CubaturePoints<Scalar>(Process::kStates)) {}
+  explicit Ckf(const Process& process = Process())
+      : Base(process, CubaturePoints<Scalar>(Process::kStates)) {}
 };
 
 }  // namespace AUVEST_INSTRUCTIONS

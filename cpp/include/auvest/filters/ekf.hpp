@@ -30,7 +30,7 @@ class Ekf : public GaussianFilter<Ekf<Process>, Process> {
   using typename Base::Scalar;
   using typename Base::State;
 
-  explicit Ekf(const Process& process) : Base(process, process.check()) {}
+  explicit Ekf(const Process& process = Process()) : Base(process, process.check()) {}
 
   Status predict_belief(BeliefType& belief, Scalar dt) const {
     this->process().propagate(belief, dt);  // [MEKF 7]

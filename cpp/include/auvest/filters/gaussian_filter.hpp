@@ -16,6 +16,8 @@
 #include "auvest/filters/square_root_update.hpp"
 #include "auvest/math/linear_algebra.hpp"
 #include "auvest/math/resolution.hpp"
+#include "auvest/models/measurement_model.hpp"
+#include "auvest/models/process_model.hpp"
 #include "auvest/status.hpp"
 #include "auvest/types.hpp"
 
@@ -104,12 +106,12 @@ class GaussianFilter {
   /// The same for a process that has an input, which is `input` during these dt seconds.
   template <class Input>
   Status predict(Scalar dt, const Input& input) {
-    if (!math::all_finite(input)) return Status::kNotFinite;
-    const Input before = process_.input;
-    process_.input = input;
-    const Status status = predict(dt);
-    if (status != Status::kOk) process_.input = before;
-    return status;
+    static_assert(InputOf<Process>::kExists,
+                  "the process of this filter has no input: predict(dt)");
+    constexpr bool kFits = InputOf<Process>::template can_be<Input>();
+    static_assert(kFits || !InputOf<Process>::kExists,
+                  "the input has another size or number type than the process asks for");
+    return predict(dt, input, Possible<kFits>());
   }
 
   /// What has driven the process since; interval policies ask for it.
@@ -123,11 +125,23 @@ class GaussianFilter {
   AUVEST_OUTLINE Correction<Scalar, Model::kSize> update(const typename Model::Measurement& z,
                                                          const Model& model) {
     static_assert(Model::kStates == kStates, "the measurement model is for another state");
+    static_assert(IsSame<typename Model::Scalar, Scalar>::value,
+                  "the measurement model is of another number type than the filter");
     constexpr int kSize = Model::kSize;
     Correction<Scalar, kSize> correction;
     correction.status = correct(z, model, SquareRootUpdate(), correction);
     if (correction.status != Status::kOk) correction.clear(correction.status);
     return correction;
+  }
+
+  /// As above, by one number, or by an expression of as many as the sensor measures.
+  template <class Model>
+  Correction<Scalar, Model::kSize> update(Scalar z, const Model& model) {
+    return update(MeasurementOf<Model>::from(z), model);
+  }
+  template <class Z, class Model>
+  Correction<Scalar, Model::kSize> update(const Eigen::MatrixBase<Z>& z, const Model& model) {
+    return update(MeasurementOf<Model>::from(z), model);
   }
 
   const State& x() const { return belief_.x; }
@@ -199,6 +213,23 @@ class GaussianFilter {
       far = far || math::is_coarse(x(i), P(i, i));
     }
     return far;
+  }
+
+  template <bool>
+  struct Possible {};
+
+  template <class Input>
+  Status predict(Scalar dt, const Input& input, Possible<true>) {
+    if (!math::all_finite(input)) return Status::kNotFinite;
+    const Input before = process_.input;
+    process_.input = input;
+    const Status status = predict(dt);
+    if (status != Status::kOk) process_.input = before;
+    return status;
+  }
+  template <class Input>
+  Status predict(Scalar, const Input&, Possible<false>) {
+    return Status::kOk;  // refused where it is called
   }
 
   /// Why dt is no step to predict.

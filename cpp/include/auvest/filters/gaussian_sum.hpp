@@ -98,6 +98,9 @@ class GaussianSum : public Robust_ {
     if (params.components > 1) state_.mixture.reserve(params.components);
   }
 
+  /// With a filter inside that needs no more than a process.
+  explicit GaussianSum(const Process& process = Process()) : GaussianSum(Base(process)) {}
+
   /// Sets the belief. A sigma of many times the distances, also 1e6 m, says: unknown.
   Status reset(const State& x0, const Covariance& P0) {
     if (params_check_ != Status::kOk) return params_check_;
@@ -179,10 +182,22 @@ class GaussianSum : public Robust_ {
   AUVEST_OUTLINE RobustCorrection<Scalar, Model::kSize> update(const typename Model::Measurement& z,
                                                                const Model& model) {
     static_assert(Model::kStates == kStates, "the measurement model is for another state");
+    static_assert(IsSame<typename Model::Scalar, Scalar>::value,
+                  "the measurement model is of another number type than the filter");
     RobustCorrection<Scalar, Model::kSize> correction;
     correction.status = take(z, model, correction, IsCircle<Model::kCircle>());
     if (correction.status != Status::kOk) correction.clear(correction.status);
     return correction;
+  }
+
+  /// As above, by one number, or by an expression of as many as the sensor measures.
+  template <class Model>
+  RobustCorrection<Scalar, Model::kSize> update(Scalar z, const Model& model) {
+    return update(MeasurementOf<Model>::from(z), model);
+  }
+  template <class Z, class Model>
+  RobustCorrection<Scalar, Model::kSize> update(const Eigen::MatrixBase<Z>& z, const Model& model) {
+    return update(MeasurementOf<Model>::from(z), model);
   }
 
   /// How many Gaussians the belief is made of.

@@ -91,8 +91,10 @@ class LateMemory {
   using Report = decltype(any_filter().update(any_measurement(), any_sensor()));
 
   /// Goes on from where `filter` is.
-  explicit LateMemory(const Filter& filter, const Events& events = Events())
-      : base_(filter), events_(events) {}
+  explicit LateMemory(const Filter& filter) : base_(filter), events_() {}
+
+  /// In events that lie elsewhere, or are of some number.
+  LateMemory(const Filter& filter, const Events& events) : base_(filter), events_(events) {}
 
   /// Forgets everything and goes on from where `filter` is.
   void restart(const Filter& filter) {
@@ -110,11 +112,23 @@ class LateMemory {
   /// Corrects by what was measured `age` >= 0 seconds ago: at the end of the prediction that ended
   /// nearest to then. Reports what the update did there. On anything but kOk nothing has changed.
   Report update(Filter& filter, const Measurement& z, const Sensor& sensor, Scalar age) {
-    if (!math::is_finite(age) || age < Scalar(0)) {
-      return Report(math::is_finite(age) ? Status::kTimeBackwards : Status::kNotFinite);
-    }
+    int at;
+    const Status status = find(age, at);
+    if (status != Status::kOk) return Report(status);
+    return at == events_.size() ? update_now(filter, z, sensor)
+                                : update_late(filter, z, sensor, at);
+  }
+
+  const Filter& base() const { return base_; }  ///< before the first event
+  const Events& events() const { return events_; }
+
+ private:
+  /// Where in the events an age belongs.
+  Status find(Scalar age, int& at) const {
+    if (!math::is_finite(age)) return Status::kNotFinite;
+    if (age < Scalar(0)) return Status::kTimeBackwards;
     const int count = events_.size();
-    int at = count;
+    at = count;
     Scalar half = Scalar(0);  // of the first prediction that is kept
     for (int k = count - 1; k >= 0; --k) {
       if (events_[k].is_update) continue;
@@ -123,30 +137,34 @@ class LateMemory {
       age = age - events_[k].dt;
       at = k;
     }
-    if (age > half) return Report(Status::kTimeBackwards);
+    return age > half ? Status::kTimeBackwards : Status::kOk;
+  }
 
-    if (at == count) {
-      const Report report = filter.update(z, sensor);
-      if (report.status == Status::kOk) insert(count, Event(z, sensor));
-      return report;
-    }
+  AUVEST_OUTLINE Report update_now(Filter& filter, const Measurement& z, const Sensor& sensor) {
+    const Report report = filter.update(z, sensor);
+    if (report.status == Status::kOk) remember(events_.size(), z, sensor);
+    return report;
+  }
+
+  AUVEST_OUTLINE Report update_late(Filter& filter, const Measurement& z, const Sensor& sensor,
+                                    int at) {
     Filter again = base_;
     for (int k = 0; k < at; ++k) events_[k].redo(again);
-    const Report report = again.update(z, sensor);
+    Report report = again.update(z, sensor);
     if (report.status != Status::kOk) return report;
-    for (int k = at; k < count; ++k) {
+    for (int k = at; k < events_.size(); ++k) {
       const Status status = events_[k].redo(again);
       if (status != Status::kOk) return Report(status);
     }
     filter = again;
-    insert(at, Event(z, sensor));
+    remember(at, z, sensor);
     return report;
   }
 
-  const Filter& base() const { return base_; }  ///< before the first event
-  const Events& events() const { return events_; }
+  AUVEST_OUTLINE void remember(int at, const Measurement& z, const Sensor& sensor) {
+    insert(at, Event(z, sensor));
+  }
 
- private:
   /// Puts the event at place `at`; the first ones leave where there is no room.
   void insert(int at, const Event& event) {
     while (events_.full()) {
@@ -170,6 +188,8 @@ class LateUpdates {
  public:
   using Memory = LateMemory<Filter, Sensor, EventArray<LateEvent<Filter, Sensor>, Capacity>>;
   using Scalar = typename Filter::Scalar;
+  using State = typename Filter::State;
+  using Covariance = typename Filter::Covariance;
   using Input = typename Memory::Input;
   using Measurement = typename Memory::Measurement;
   using Report = typename Memory::Report;
@@ -177,12 +197,31 @@ class LateUpdates {
   /// Goes on from where `filter` is.
   explicit LateUpdates(const Filter& filter) : filter_(filter), memory_(filter) {}
 
+  /// With a filter that needs no parameters: reset() gives it its belief.
+  LateUpdates() : memory_(filter_) {}
+
+  /// Sets the belief, as the filter does; everything before is forgotten.
+  Status reset(const State& x0, const Covariance& P0) {
+    const Status status = filter_.reset(x0, P0);
+    if (status == Status::kOk) memory_.restart(filter_);
+    return status;
+  }
+
   /// Carries the filter dt >= 0 seconds forward with this input.
   Status predict(Scalar dt, const Input& input) { return memory_.predict(filter_, dt, input); }
 
   /// Corrects by what was measured `age` >= 0 seconds ago. On anything but kOk nothing has changed.
   Report update(const Measurement& z, const Sensor& sensor, Scalar age = Scalar(0)) {
     return memory_.update(filter_, z, sensor, age);
+  }
+
+  /// As above, by one number, or by an expression of as many as the sensor measures.
+  Report update(Scalar z, const Sensor& sensor, Scalar age = Scalar(0)) {
+    return update(MeasurementOf<Sensor>::from(z), sensor, age);
+  }
+  template <class Z>
+  Report update(const Eigen::MatrixBase<Z>& z, const Sensor& sensor, Scalar age = Scalar(0)) {
+    return update(MeasurementOf<Sensor>::from(z), sensor, age);
   }
 
   const Filter& filter() const { return filter_; }

@@ -20,6 +20,11 @@ class Robust : public Filter {
   explicit Robust(const Filter& filter, const Rule& rule = Rule())
       : Filter(filter), rule_(rule), rule_check_(rule.check()) {}
 
+  /// The same of a filter that needs no more than a process.
+  explicit Robust(const typename Filter::Process& process = typename Filter::Process(),
+                  const Rule& rule = Rule())
+      : Filter(process), rule_(rule), rule_check_(rule.check()) {}
+
   /// Sets the belief; the recovery policy forgets the past.
   Status reset(const State& x0, const Covariance& P0) {
     if (rule_check_ != Status::kOk) return rule_check_;
@@ -47,10 +52,22 @@ class Robust : public Filter {
   AUVEST_OUTLINE RobustCorrection<Scalar, Model::kSize> update(const typename Model::Measurement& z,
                                                                const Model& model) {
     static_assert(Model::kStates == Filter::kStates, "the measurement model is for another state");
+    static_assert(IsSame<typename Model::Scalar, Scalar>::value,
+                  "the measurement model is of another number type than the filter");
     RobustCorrection<Scalar, Model::kSize> correction;
     correction.status = this->correct(z, model, rule_, correction);
     if (correction.status != Status::kOk) correction.clear(correction.status);
     return correction;
+  }
+
+  /// As above, by one number, or by an expression of as many as the sensor measures.
+  template <class Model>
+  RobustCorrection<Scalar, Model::kSize> update(Scalar z, const Model& model) {
+    return update(MeasurementOf<Model>::from(z), model);
+  }
+  template <class Z, class Model>
+  RobustCorrection<Scalar, Model::kSize> update(const Eigen::MatrixBase<Z>& z, const Model& model) {
+    return update(MeasurementOf<Model>::from(z), model);
   }
 
   /// kOk, kNotInitialised, or kRecoveriesRepeat: the recovery policy has widened the belief too

@@ -15,7 +15,7 @@ class Ukf : public SigmaPointFilter<Process, SigmaPoints<typename Process::Scala
   using typename Base::Scalar;
   using Params = typename SigmaPoints<Scalar>::Params;
 
-  explicit Ukf(const Process& process, const Params& params = default_params())
+  explicit Ukf(const Process& process = Process(), const Params& params = default_params())
       : Base(process, SigmaPoints<Scalar>(params, Process::kStates)) {}
 
   /// Params() with kappa = 3 - n, which matches the fourth moments of a Gaussian.

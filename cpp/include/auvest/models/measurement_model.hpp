@@ -113,5 +113,45 @@ struct MeasurementModel {
   const Derived& derived() const { return static_cast<const Derived&>(*this); }
 };
 
+/// A measurement as a caller may write it, as the model has it: one number, or any expression. What
+/// does not fit is one error, here, and not some of Eigen's.
+template <class Model>
+struct MeasurementOf {
+  using Measurement = typename Model::Measurement;
+  using Scalar = typename Measurement::Scalar;
+
+  static Measurement from(Scalar z) {
+    static_assert(Model::kSize == 1,
+                  "this sensor measures more than one number: give a Vector of them");
+    Measurement one;
+    one(0) = z;
+    return one;
+  }
+
+  template <class Z>
+  static Measurement from(const Eigen::MatrixBase<Z>& z) {
+    constexpr int kRows = Z::RowsAtCompileTime;
+    constexpr int kWanted = Measurement::RowsAtCompileTime;
+    constexpr bool kFits = kRows == kWanted || kRows == Eigen::Dynamic || kWanted == Eigen::Dynamic;
+    constexpr bool kAlike = IsSame<typename Z::Scalar, Scalar>::value;
+    static_assert(kFits, "z has not as many numbers as this sensor measures");
+    static_assert(kAlike, "z is of another number type than the sensor: z.cast<float>() gives it");
+    return evaluate(z, Possible < kFits && kAlike > ());
+  }
+
+ private:
+  template <bool>
+  struct Possible {};
+
+  template <class Z>
+  static Measurement evaluate(const Z& z, Possible<true>) {
+    return z;
+  }
+  template <class Z>
+  static Measurement evaluate(const Z&, Possible<false>) {
+    return Measurement();
+  }
+};
+
 }  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

@@ -107,5 +107,48 @@ struct ProcessModel {
   const Derived& derived() const { return static_cast<const Derived&>(*this); }
 };
 
+/// Whether a process has an input, and whether what is `Given` can be it.
+template <class Process>
+class InputOf {
+  static constexpr bool agree(int rows, int given) {
+    return rows == given || rows == Eigen::Dynamic || given == Eigen::Dynamic;
+  }
+
+  template <class Input, class Given>
+  static constexpr bool alike(const typename Input::Scalar*, const typename Given::Scalar*) {
+    return IsSame<typename Input::Scalar, typename Given::Scalar>::value &&
+           agree(Input::RowsAtCompileTime, Given::RowsAtCompileTime);
+  }
+  template <class Input, class Given>
+  static constexpr bool alike(...) {
+    return IsSame<Input, Given>::value;
+  }
+
+  template <class P>
+  static constexpr bool declared(const typename P::Input*) {
+    return true;
+  }
+  template <class P>
+  static constexpr bool declared(...) {
+    return false;
+  }
+  template <class P, class Given>
+  static constexpr bool takes(const typename P::Input*) {
+    return alike<typename P::Input, Given>(nullptr, nullptr);
+  }
+  template <class P, class Given>
+  static constexpr bool takes(...) {
+    return false;
+  }
+
+ public:
+  static constexpr bool kExists = declared<Process>(nullptr);
+
+  template <class Given>
+  static constexpr bool can_be() {
+    return takes<Process, Given>(nullptr);
+  }
+};
+
 }  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

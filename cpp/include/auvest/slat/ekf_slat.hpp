@@ -43,7 +43,8 @@ class EkfSlat : public SlatFilter<Motion_, Masters, Safeguards_> {
 
   using Params = EkfSlatParams<Scalar>;
 
-  EkfSlat(const Motion& motion, const Master& master, const Params& params = Params())
+  explicit EkfSlat(const Motion& motion = Motion(), const Master& master = Master(),
+                   const Params& params = Params())
       : model_(motion, master), params_(params) {
     math::set_zero(belief_.x);
     math::set_zero(belief_.P);

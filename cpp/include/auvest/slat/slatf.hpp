@@ -128,6 +128,11 @@ class Slatf : public SlatfFrame<
         const Resampling& resampling = Resampling())
       : Slatf(motion, master, params, storage.numbers, Capacity, resampling) {}
 
+  /// Noise, gate and recovery are those of default parameters.
+  template <int Capacity>
+  explicit Slatf(ParticleStorage<Scalar, Frame::Set::kFields, Capacity>& storage)
+      : Slatf(Motion(), Master(), Params(), storage) {}
+
   /// A copy of `other`, whose particles are copied into a storage as large as its own.
   Slatf(const Slatf& other, Scalar* storage)
       : Frame(other, storage),

@@ -88,6 +88,11 @@ class SlatfJoint : public SlatfJointFrame<Motion_, Masters, Resampling_, Safegua
              const Resampling& resampling = Resampling())
       : SlatfJoint(motion, master, params, storage.numbers, Capacity, resampling) {}
 
+  /// Noise, gate and recovery are those of default parameters.
+  template <int Capacity>
+  explicit SlatfJoint(ParticleStorage<Scalar, Fields::kFields, Capacity>& storage)
+      : SlatfJoint(Motion(), Master(), Params(), storage) {}
+
   /// A copy of `other`, whose particles are copied into a storage as large as its own.
   SlatfJoint(const SlatfJoint& other, Scalar* storage)
       : Frame(other, storage), model_(other.model_), params_(other.params_) {}

@@ -86,6 +86,11 @@ class SlatfShared : public SlatfSharedFrame<Motion_, Masters, Resampling_, Safeg
               const Resampling& resampling = Resampling())
       : SlatfShared(motion, master, params, storage.numbers, Capacity, resampling) {}
 
+  /// Noise, gate and recovery are those of default parameters.
+  template <int Capacity>
+  explicit SlatfShared(ParticleStorage<Scalar, kStates, Capacity>& storage)
+      : SlatfShared(Motion(), Master(), Params(), storage) {}
+
   /// A copy of `other`, whose particles are copied into a storage as large as its own.
   SlatfShared(const SlatfShared& other, Scalar* storage)
       : Frame(other, storage),

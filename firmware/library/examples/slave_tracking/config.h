@@ -42,6 +42,17 @@ constexpr uint8_t kTriggerPin = 8;
 constexpr float kReadingTimeout = 0.1f;
 constexpr float kEchoTimeout = 0.6f;
 
+/// No reading or echo can be beyond these: m/s; m, sound has not come back from further in time;
+/// and what the range changes by, m/s, but for the noise of two echoes.
+constexpr float kFastest = 20;
+constexpr float kLargestRange = 750 * kEchoTimeout;
+constexpr float kFastestApproach = 30;
+
+/// An echo whose NIS is beyond it says nothing to a particle. 0: every echo counts, as in the
+/// paper. A gate needs a way back from a master that is lost, which Safeguards have and this chip
+/// has no RAM for: with one, take SlatfShared.
+constexpr float kGate = 0;
+
 /// Floats are sent as their bits, 8 hexadecimal digits. false: with 3 decimals, to be read in the
 /// Serial Monitor.
 constexpr bool kExactText = true;

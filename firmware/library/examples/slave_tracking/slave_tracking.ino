@@ -18,7 +18,8 @@
 // Moments add up, so they do not drift. If the chip is still busy more than 1 ms after a deadline,
 // the sample is taken at once and counted as late; the prediction covers the time that really
 // passed. A reading that does not come is replaced by the last one, an echo by nothing; both are
-// counted as missed.
+// counted as missed. So is what cannot be (status kImpossibleRange or kImplausible), which is
+// counted as implausible.
 //
 // Text, 115200 baud: $SLAVE,...*hhhhhhhh; a line at the start names its columns. The estimates are
 // computed after pings only. Now and then a comment says how much RAM was never used.
@@ -35,6 +36,7 @@
 
 constexpr uint32_t kTicks = wake_timer::to_ticks(kPeriod);
 constexpr uint32_t kTolerance = wake_timer::to_ticks(0.001f);
+constexpr float kTurn = 6.2842f;                          // 2 pi, and a little for rounding
 constexpr uint32_t kPause = wake_timer::to_ticks(0.05f);  // enough to look at the RAM
 
 Motion::Params readings_noise() {
@@ -48,23 +50,24 @@ auvest::Sonar<float>::Params echo_noise() {
   auvest::Sonar<float>::Params params;
   params.sigma_range_m = kSigmaRange;
   params.sigma_bearing_rad = kSigmaBearing;
+  params.largest_range_m = kLargestRange;
   return params;
 }
 
-// Every echo counts, as in the paper.
-Filter::Params no_gate() {
+Filter::Params gate() {
   Filter::Params params;
-  params.gate = 0;
+  params.gate = kGate;
   return params;
 }
 
 // All objects are global: what they take is known before the sketch runs.
 Filter::Storage<kParticles> particles;
-Filter filter(Motion(readings_noise()), Master(), no_gate(), particles);
+Filter filter(Motion(readings_noise()), Master(), gate(), particles);
 auvest::math::Random random_numbers(kSeed);
 const auvest::Sonar<float> sonar(echo_noise());
 const MasterPlan plan;
 auvest_board::SerialInstruments instruments;
+auvest::PlausibleReading<float> range;
 Telemetry telemetry;
 Sample sample;
 uint32_t moment = 0;         // of this sample, ticks
@@ -72,7 +75,7 @@ uint32_t deadline = kTicks;  // of the next one, ticks
 
 static_assert(auvest_board::fits(sizeof particles + sizeof filter + sizeof random_numbers +
                                      sizeof sonar + sizeof plan + sizeof instruments +
-                                     sizeof telemetry + sizeof sample,
+                                     sizeof range + sizeof telemetry + sizeof sample,
                                  kStackReserve),
               "the objects of this sketch leave less than kStackReserve bytes of RAM to the stack");
 
@@ -97,7 +100,36 @@ AUVEST_OUTLINE void predict(float from_s, float to_s) {
   note(filter.predict(sample.dt, sample.u, random_numbers, &change));
 }
 
+bool is_angle(float rad) { return auvest::math::within(rad, -kTurn, kTurn); }
+
+void refuse(auvest::Status status) {
+  ++sample.implausible;
+  note(status);
+}
+
+/// The reading that has come, if it can be.
+AUVEST_OUTLINE void take(const auvest::Vector<float, 2>& reading) {
+  if (auvest::math::within(reading(0), -kFastest, kFastest) && is_angle(reading(1))) {
+    sample.u = reading;
+  } else {
+    sample.read = false;
+    refuse(auvest::Status::kImplausible);
+  }
+}
+
+/// Whether the echo can be.
+AUVEST_OUTLINE bool admits(const auvest::Vector<float, 2>& z) {
+  const auvest::ReadingLimits<float> limits(0, kLargestRange, kFastestApproach, 12 * kSigmaRange);
+  auvest::Status status = sonar.params.admits(z(0));
+  if (status == auvest::Status::kOk && !(range.admits(z(0), limits) && is_angle(z(1)))) {
+    status = auvest::Status::kImplausible;
+  }
+  if (status != auvest::Status::kOk) refuse(status);
+  return status == auvest::Status::kOk;
+}
+
 AUVEST_OUTLINE void update() {
+  range.take(sample.z(0));
   const auvest::Echo<float> echo = {sample.z, 0};
   note(filter.update(&echo, 1, sonar, random_numbers));
 }
@@ -149,8 +181,9 @@ void loop() {
   if (sample.pinged) pulse();
   instruments.begin(sample.number);
   instruments.ask("ODO");
-  sample.read = instruments.await("MOTION", moment + wake_timer::to_ticks(kReadingTimeout),
-                                  sample.u, telemetry.line());
+  auvest::Vector<float, 2> reading;
+  sample.read = instruments.await("MOTION", moment + wake_timer::to_ticks(kReadingTimeout), reading,
+                                  telemetry.line());
   if (sample.pinged) instruments.ask("PING");
 
   // The filter.
@@ -158,15 +191,21 @@ void loop() {
   const float from_s = sample.time.in_seconds();
   sample.time.add(moment - previous);
   sample.dt = late ? wake_timer::to_seconds(moment - previous) : kPeriod;
+  if (!sample.read) {
+    ++sample.missed;
+  } else {
+    take(reading);
+  }
+  range.wait(sample.dt);
   predict(from_s, sample.time.in_seconds());
   sample.heard =
       sample.pinged && instruments.await("SONAR", moment + wake_timer::to_ticks(kEchoTimeout),
                                          sample.z, telemetry.line());
+  if (sample.pinged && !sample.heard) ++sample.missed;
+  sample.heard = sample.heard && admits(sample.z);
   if (sample.heard) update();
 
   // The line.
-  if (!sample.read) ++sample.missed;
-  if (sample.pinged && !sample.heard) ++sample.missed;
   if (late) ++sample.late;
   report();
 }

@@ -25,12 +25,13 @@ struct Sample {
   auvest::Status status = auvest::Status::kOk;  ///< the first that is not kOk
   uint32_t missed = 0;                          ///< readings and echoes that did not come
   uint32_t refused = 0;                         ///< lines received that were of no use
+  uint32_t implausible = 0;                     ///< readings and echoes beyond their limits
   uint32_t late = 0;                            ///< samples taken after their deadline
   uint32_t awake = 0;                           ///< ticks since the line before
 };
 
 class Telemetry {
-  static constexpr size_t kNumbers = 20;
+  static constexpr size_t kNumbers = 18;
   static constexpr size_t kCapacity = 88 + kNumbers * (kExactText ? 9 : 10);
 
  public:
@@ -44,7 +45,8 @@ class Telemetry {
         F(",SLAVE,sample#,time_s,dt_s,speed_m_s,heading_rad,range_m,bearing_rad,"
           "x_m,y_m,P00_m2,P10_m2,P11_m2,master_x_m,master_y_m,master_vx_m_s,master_vy_m_s,"
           "master_P00_m2,master_P10_m2,master_P11_m2,n_eff,resamplings#,"
-          "status#,missed#,refused#,late#,awake_us#"));
+          "status#,missed#,refused#,implausible#,"
+          "late#,awake_us#"));
     line.finish();
     Serial.flush();
   }
@@ -74,6 +76,7 @@ class Telemetry {
     line_.field(static_cast<uint32_t>(sample.status));
     line_.field(sample.missed);
     line_.field(sample.refused);
+    line_.field(sample.implausible);
     line_.field(sample.late);
     line_.field(sample.awake * auvest_board::kMicrosecondsPerTick);
     line_.finish();

@@ -22,6 +22,15 @@ constexpr float kAnswerTimeout = 0.1f;
 /// A range beyond it cannot be: sound has not come back from there in time. The filter refuses it.
 constexpr float kLargestRange = 750 * kAnswerTimeout;
 
+/// Nor can it change faster, m/s, but for the noise of two of them, m.
+constexpr float kFastest = 10;
+constexpr float kRangeJitter = 2;
+
+/// A measurement whose NIS is beyond it is refused: 13.8 loses one good one in 1,000. So many
+/// refused in a row say that the estimate is wrong, which then knows less, until one is taken.
+constexpr float kGate = 13.8f;
+constexpr uint8_t kPatience = 5;
+
 /// Floats are sent as their bits, 8 hexadecimal digits. false: with 6 decimals, to be read in the
 /// Serial Monitor; small variances then round to nothing.
 constexpr bool kExactText = true;

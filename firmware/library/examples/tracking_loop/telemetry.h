@@ -15,16 +15,16 @@ namespace wake_timer = auvest_board::wake_timer;
 /// What a sample was besides the state of the filter. Counters run from the start.
 struct Sample {
   uint32_t number = 0;
-  wake_timer::Elapsed time;          ///< of the sample, since the start
-  float dt = 0;                      ///< predicted over [s]
-  bool measured = false;             ///< there is a z
-  bool corrected = false;            ///< and the filter has taken it
-  auvest::Vector<float, 2> z;        ///< range [m] and bearing [rad]
-  auvest::Vector<float, 2> desired;  ///< position [m]
-  float nis = 0;
+  wake_timer::Elapsed time;                     ///< of the sample, since the start
+  float dt = 0;                                 ///< predicted over [s]
+  bool measured = false;                        ///< there is a z
+  auvest::Vector<float, 2> z;                   ///< range [m] and bearing [rad]
+  auvest::Vector<float, 2> desired;             ///< position [m]
+  float nis = 0;                                ///< of z; below 0: the filter has not looked at it
   auvest::Status status = auvest::Status::kOk;  ///< the first that is not kOk
   uint32_t missed = 0;                          ///< samples without a measurement
   uint32_t refused = 0;                         ///< lines received that were of no use
+  uint32_t implausible = 0;                     ///< measurements beyond limits or gate
   uint32_t late = 0;                            ///< samples taken after their deadline
   uint32_t awake = 0;                           ///< ticks since the line before
 };
@@ -55,7 +55,7 @@ class Telemetry {
         if (per_seconds > 1) line.print(per_seconds);
       }
     }
-    line.print(F(",nis,interval_s,status#,missed#,refused#,late#,awake_us#"));
+    line.print(F(",nis,interval_s,status#,missed#,refused#,implausible#,late#,awake_us#"));
     line.finish();
     Serial.flush();
   }
@@ -78,11 +78,12 @@ class Telemetry {
     for (int i = 0; i < kCovarianceRows; ++i) {
       for (int j = 0; j <= i; ++j) number(filter.belief().P(i, j));
     }
-    optional(sample.corrected, sample.nis);
+    optional(sample.nis >= 0, sample.nis);
     number(filter.interval());
     line_.field(static_cast<uint32_t>(sample.status));
     line_.field(sample.missed);
     line_.field(sample.refused);
+    line_.field(sample.implausible);
     line_.field(sample.late);
     line_.field(sample.awake * auvest_board::kMicrosecondsPerTick);
     line_.finish();

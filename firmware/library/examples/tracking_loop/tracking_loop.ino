@@ -12,6 +12,11 @@
 // Missing measurements. No answer in time, a wrong checksum, garbage, an answer to another sample:
 // the estimate is predicted only, and counted as missed.
 //
+// Impossible measurements. A range that sound cannot have come back from has the status
+// kImpossibleRange; one that changes faster than the vehicle moves, a bearing beyond a turn, or
+// both beyond the gate of the filter, kImplausible. All are counted as implausible, and predicted
+// only.
+//
 // Text, 115200 baud. Each sample gives one line, $AUV,...*hhhhhhhh; a line at the start names its
 // columns. `auvest capture` makes a table and a figure of it; config.h has the other choices. A
 // line goes out at once if it is through before the next deadline, else behind the next request:
@@ -27,16 +32,17 @@
 #include "sonar.h"
 #include "telemetry.h"
 
-using Filter = auvest::Aukf<Process, IntervalPolicy>;
+using Filter = auvest::AdaptiveInterval<auvest::Gated<auvest::Ukf<Process>>, IntervalPolicy>;
 
 constexpr uint32_t kTolerance = wake_timer::to_ticks(0.001f);
 constexpr uint32_t kTimeout = wake_timer::to_ticks(kAnswerTimeout);
+constexpr float kTurn = 6.2842f;                          // 2 pi, and a little for rounding
 constexpr uint32_t kPause = wake_timer::to_ticks(0.05f);  // enough to look at the RAM
 
-auvest::Ukf<Process> make_ukf() {
+auvest::Ukf<Process>::Params points() {
   auvest::Ukf<Process>::Params points = auvest::Ukf<Process>::default_params();
   points.alpha = kAlpha;
-  return auvest::Ukf<Process>(Process(), points);
+  return points;
 }
 
 auvest::RangeBearing<float, 6>::Params sonar_params() {
@@ -46,11 +52,13 @@ auvest::RangeBearing<float, 6>::Params sonar_params() {
 }
 
 // All objects are global: what they take is known before the sketch runs.
-Filter filter(make_ukf());
+Filter filter(Process(), points());
 const auvest::RangeBearing<float, 6> model(sonar_params());
 SerialSonar sonar(kTriggerPin);
+auvest::PlausibleReading<float> range;
 Telemetry telemetry;
 Sample sample;
+uint8_t refusals = 0;   // by the gate, in a row
 uint32_t moment = 0;    // of this sample, ticks
 uint32_t deadline = 0;  // of the next one, ticks
 
@@ -84,6 +92,30 @@ void note(auvest::Status status) {
   if (sample.status == auvest::Status::kOk) sample.status = status;
 }
 
+bool can_be(const SerialSonar::Measurement& z) {
+  const auvest::ReadingLimits<float> limits(-kLargestRange, kLargestRange, kFastest, kRangeJitter);
+  return range.admits(z(0), limits) && auvest::math::within(z(1), -kTurn, kTurn);
+}
+
+void update() {
+  const auvest::Status admitted = model.admits(sample.z);
+  auvest::Status status =
+      admitted != auvest::Status::kOk || can_be(sample.z) ? admitted : auvest::Status::kImplausible;
+  if (status == auvest::Status::kOk) {
+    const auto correction = filter.update(sample.z, model);
+    status = correction.status;
+    sample.nis = correction.nis;
+    if (status == auvest::Status::kOk) {
+      range.take(sample.z(0));
+      refusals = 0;
+    } else if (++refusals > kPatience) {
+      filter.widen(correction.nis);
+    }
+  }
+  if (status != auvest::Status::kOk) ++sample.implausible;
+  note(status);
+}
+
 void setup() {
   Serial.begin(auvest_board::kBaud);
   sonar.begin();
@@ -115,13 +147,9 @@ void loop() {
   sample.dt = late ? wake_timer::to_seconds(moment - previous) : filter.interval();
   sample.desired = desired(sample.time.in_seconds());
   sample.status = filter.predict(sample.dt);
-  sample.corrected = false;
-  if (sample.measured) {
-    const auto correction = filter.update(sample.z, model);
-    sample.corrected = correction.status == auvest::Status::kOk;
-    sample.nis = correction.nis;
-    note(correction.status);
-  }
+  sample.nis = -1;
+  range.wait(sample.dt);
+  if (sample.measured) update();
   note(filter.feedback(sample.desired));
   deadline = moment + wake_timer::to_ticks(filter.interval());
 
