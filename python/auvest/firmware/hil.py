@@ -23,7 +23,7 @@ from auvest.firmware.hil_bench import Bench, answer_of, bench
 from auvest.firmware.hil_record import Record, Words, on_desk
 from auvest.firmware.hil_serial import over_serial
 from auvest.firmware.package import package
-from auvest.firmware.sketch import compile_sketch
+from auvest.firmware.sketch import Compiled, compile_sketch
 from auvest.models._compile import find_compiler
 from auvest.telemetry import LineError
 
@@ -289,7 +289,7 @@ def _on_cortex(program: Bench, folder: Path, target: str, flags: Sequence[str]) 
 
 def _on_avr(program: Bench, folder: Path, figures: dict[str, int]) -> list[str]:
     runner = simulator.find_or_build()
-    compiled = compile_sketch(program.write(folder), package(folder), folder / "compiled")
+    compiled = build_sketch(program, folder)
     rows, answers = _files(program, folder, "atmega2560")
     with rows.open("a", encoding="ascii") as file:
         file.write("\x04")  # end of transmission
@@ -308,6 +308,12 @@ def _on_avr(program: Bench, folder: Path, figures: dict[str, int]) -> list[str]:
         cycles_max=step.maximum,
     )
     return answers.read_text("ascii").splitlines()
+
+
+def build_sketch(program: Bench, folder: Path, *, serial: bool = False) -> Compiled:
+    """Compile a bench for the MEGA2560, as the Arduino IDE does."""
+    sketch = program.write(folder, serial=serial)
+    return compile_sketch(sketch, package(folder), folder / "compiled")
 
 
 def _play(program: Bench, folder: Path, target: str, command: Sequence[str]) -> list[str]:

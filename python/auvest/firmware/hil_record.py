@@ -190,6 +190,7 @@ def on_desk(record: Record) -> Words:
     weights = np.full(record.z.shape[1] if filter_.kernel is not None else 0, np.nan, np.float32)
     measured = record.measured
     placed = place_given(record)
+    places = [len(place_names(model)) for model in record.sensors]
     lines = []
     for k in range(-1, len(record)):
         said, nis, weight = int(Status.ok), np.nan, weights.copy()
@@ -201,7 +202,7 @@ def on_desk(record: Record) -> Words:
                     float(record.dt[k]), record.input[k] if record.input.shape[1] else None
                 )
                 if measured[k]:
-                    place = record.place[k] if placed[k] else None
+                    place = record.place[k, : places[record.sensor[k]]] if placed[k] else None
                     filter_.update(record.z[k, :size], model, place=place)
                     report = filter_.report
                     assert report is not None
