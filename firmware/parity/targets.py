@@ -14,6 +14,7 @@ from typing import Literal
 
 ROOT = Path(__file__).resolve().parents[2]
 HERE = ROOT / "firmware/parity"
+BENCH = ROOT / "firmware/bench"
 INCLUDES = (f"-I{ROOT / 'cpp/include'}", f"-I{ROOT / 'cpp'}", "-I/usr/include/eigen3")
 
 _WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wdouble-promotion", "-Werror")
@@ -71,7 +72,7 @@ class Target:
             return (HERE / "avr.cpp", *self.library)
         if self.machine == "host":
             return (HERE / "host.cpp",)
-        return (HERE / "host.cpp", HERE / "cortex_m.cpp")
+        return (HERE / "host.cpp", BENCH / "cortex_m.cpp")
 
     def build(self, program: Path, *extra: str | Path) -> Path:
         """Compile the replay program; ``extra`` are further flags and sources.
@@ -158,7 +159,7 @@ def _avr(name: str, *flags: str, library: tuple[Path, ...] = ()) -> Target:
 
 def _cortex(name: str, machine: Literal["mps2-an385", "mps2-an386"], *flags: str) -> Target:
     common = ("-O2", "-std=c++11", "-ffp-contract=off", "-mthumb", *flags, *_EIGEN, *_WARNINGS)
-    common += ("-fno-exceptions", "-fno-rtti", "--specs=rdimon.specs", f"-T{HERE / 'mps2.ld'}")
+    common += ("-fno-exceptions", "-fno-rtti", "--specs=rdimon.specs", f"-T{BENCH / 'mps2.ld'}")
     return Target(name, "arm-none-eabi-g++", common, machine)
 
 

@@ -26,6 +26,7 @@ COMMANDS: Mapping[tuple[str, ...], str] = {
         "Measure a filter with your models on the simulated MEGA2560: flash, RAM, stack, cycles."
     ),
     ("filters",): "List the filters: what each takes, and where it runs with the same bits.",
+    ("hil",): "Play a log to the filter on a chip, and compare every bit with the desk.",
     ("import",): "Turn a published recording into logs for 'auvest replay'.",
     ("library",): "Write the Arduino library: a zip for the IDE or PlatformIO.",
     ("mission",): "Play the vehicle that the sketch mission steers, on a board or simulated.",
@@ -175,6 +176,8 @@ def _main(
       auvest replay --help               your own recordings through any filter
 
       auvest cost my_models.hpp          what your models take on the chip, and their bits there
+
+      auvest hil my_log                  a recording through the filter on chips, bit by bit
 
       auvest mission --help              the vehicle in the loop of a board that steers it
 

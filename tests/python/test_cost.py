@@ -26,12 +26,12 @@ def test_a_model_is_a_name_with_parameters():
 
 def test_parameters_that_differ_are_written_with_all_their_digits():
     model = cost._model("LeaderRange(sigma_range_m=0.1)", {}, None).model
-    text = cost._made(model, "Sensor0", "make")
+    text = cost.made(model, "Sensor0", "make")
     number = text.partition("value = ")[2].partition("f;")[0]
     assert np.float32(number) == np.float32(0.1)
     assert text.count("strcmp") == 1
     default = cost._model("LeaderRange", {}, None).model
-    assert cost._made(default, "Sensor0", "make") == "Sensor0 make() { return Sensor0(); }"
+    assert cost.made(default, "Sensor0", "make") == "Sensor0 make() { return Sensor0(); }"
 
 
 @pytest.mark.parametrize(

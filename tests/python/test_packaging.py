@@ -104,7 +104,7 @@ def test_load_models_from_an_installed_wheel(wheel, root, tmp_path, run):
 def test_wheel_ships_what_firmware_is_made_from(wheel, root):
     with zipfile.ZipFile(wheel) as archive:
         shipped = {name: archive.read(name) for name in archive.namelist()}
-    for folder in ("library", "avr_std", "board", "cost"):
+    for folder in ("library", "avr_std", "board", "cost", "bench"):
         paths = [path for path in (root / "firmware" / folder).rglob("*") if path.is_file()]
         assert paths
         for path in paths:

@@ -467,11 +467,11 @@ def _sketch(
         if kernel is not None:
             arguments = "Guarded(Plain(process()))"
     types = [re.sub(r"\bN\b", str(states), sensor.type) for sensor in sensors]
-    make = [_made(process.model, "Process", "process"), ""]
+    make = [made(process.model, "Process", "process"), ""]
     cases = []
     for i, (sensor, type_) in enumerate(zip(sensors, types, strict=True)):
         make.append(f"using Sensor{i} = {type_};")
-        make.append(_made(sensor.model, f"Sensor{i}", f"make_sensor_{i}"))
+        make.append(made(sensor.model, f"Sensor{i}", f"make_sensor_{i}"))
         make.append(f"const Sensor{i} sensor_{i} = make_sensor_{i}();")
         cases.append(f"    case {i}: status = correct(row, sensor_{i}); break;")
     update = "status = filter.update(row.z, sensor_0).status;"
@@ -500,17 +500,31 @@ def _sketch(
     return re.sub(r"@(\w+)@", lambda place: places[place[1]], text)
 
 
-def _made(model: Model, type_: str, function: str) -> str:
+def made(model: Model, type_: str, function: str) -> str:
     """Write the function that makes a model with the parameters that it has on the desk."""
     defaults = model._core_defaults()
     own = {name: value for name, value in model._core_params().items() if value != defaults[name]}
     if not own:
         return f"{type_} {function}() {{ return {type_}(); }}"
-    lines = [f"{type_} {function}() {{", f"  {type_} model;"]
-    lines.append("  model.params.visit([](const char* name, float& value) {")
-    for name, value in own.items():
-        lines.append(f'    if (strcmp(name, "{name}") == 0) value = {value:.8e}f;')
-    return "\n".join([*lines, "  });", "  return model;", "}"])
+    lines = [f"{type_} {function}() {{", f"  {type_} model;", *assigned("model.params", own)]
+    return "\n".join([*lines, "  return model;", "}"])
+
+
+def assigned(params: str, values: Mapping[str, float]) -> list[str]:
+    """Write the lines that give members of a struct ``params`` these values, by their names."""
+    if not values:
+        return []
+    lines = [f"  {params}.visit([](const char* name, float& value) {{"]
+    for name, value in values.items():
+        lines.append(f'    if (strcmp(name, "{name}") == 0) value = {literal(value)};')
+    return [*lines, "  });"]
+
+
+def literal(value: float) -> str:
+    """Write the float32 of a number in C++."""
+    if np.isinf(value):
+        return f"{'-' if value < 0 else ''}auvest::math::infinity()"
+    return f"{np.float32(value):.8e}f"
 
 
 def _compile(

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -57,8 +57,12 @@ class Replay(ABC):
         Time (s), x, y (m) and heading (rad) of the start.
     streams : dict of str to Stream
         The files that are read line by line.
+    listener : callable, optional
+        Gets each stretch of rows before the filter does: the filter, z, and the other arguments of
+        its ``run``.
     """
 
+    listener: Callable[[GaussianFilter, Rows, Mapping[str, Any]], None] | None = None
     _measured: str
 
     def __init__(self, log: LogFolder, settings: Settings, filter_name: FilterName) -> None:
@@ -133,6 +137,12 @@ class Replay(ABC):
 
     @abstractmethod
     def _advance(self, limit: float, *, last: bool) -> Batch: ...
+
+    def _run_rows(self, filter_: GaussianFilter, z: Rows, **rows: Any) -> RunResult:
+        """Take the filter through these rows; who listens gets them first."""
+        if self.listener is not None:
+            self.listener(filter_, z, rows)
+        return filter_.run(z, **rows)
 
     def _take(self, name: str, limit: float) -> Rows:
         """Take the waiting rows of a file up to and with a time."""
@@ -358,7 +368,8 @@ class Localiser(Replay):
         results, sigmas = [], []
         for part in np.split(np.arange(len(z)), cuts):
             sensor = replace(self._sensor, sigma_leader_m=max(float(spread[part[-1]]), 0.0))
-            result = self._filter.run(
+            result = self._run_rows(
+                self._filter,
                 z[part],
                 dt=dt[part],
                 input=motion[part],
@@ -484,7 +495,7 @@ class Tracker(Replay):
         if len(fixes) == 0:
             return np.empty((0, 6)), np.empty((0, 6, 6))
         dt = np.diff(fixes[:, 0], prepend=self._now)
-        result = tracker.run(fixes[:, 2:4], dt=dt, place=places[:, :2])
+        result = self._run_rows(tracker, fixes[:, 2:4], dt=dt, place=places[:, :2])
         _fill(columns, np.flatnonzero(used), updates_of([result]))
         return result.x, result.P
 
@@ -506,6 +517,9 @@ class Tracker(Replay):
                 columns["outcome"][k] = tables.HELD_OUT
                 continue
             station = (float(places[k, 0]), float(places[k, 1]))
+            if self.listener is not None:
+                row = {"dt": fixes[k : k + 1, 0] - now, "place": places[k : k + 1, :2]}
+                self.listener(tracker, fixes[k : k + 1, 2:4], row)
             tracker.predict(fixes[k, 0] - now)
             tracker.update(fixes[k, 2:4], place=station)
             tracker.feedback()

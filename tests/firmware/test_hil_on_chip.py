@@ -1,0 +1,106 @@
+"""`auvest hil` on the simulated MEGA2560, on a Cortex-M in QEMU, and over a line to the board."""
+
+import numpy as np
+import pytest
+
+import auvest
+from auvest.firmware import hil, hil_serial
+from auvest.firmware.hil_bench import bench
+from auvest.firmware.hil_record import Record, on_desk
+from firmware import hil_line
+
+pytest_plugins = ["board_support"]
+
+ROWS = 40
+FIELDS = 1 + 4 + 10 + 1 + 2  # status, x, P, NIS, weights
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Programs; Arduino's core among them is compiled once."""
+    return tmp_path_factory.mktemp("hil")
+
+
+@pytest.fixture
+def _board(runner, monkeypatch):
+    monkeypatch.setenv("AUVEST_BOARD", str(runner))
+
+
+@pytest.fixture(scope="module")
+def record():
+    """A leader that moves and a station in turn, a row in five without either, an outlier."""
+    process = auvest.SpeedHeading(heading_bias=True)
+    leader = auvest.LeaderRange(sigma_range_m=0.3)
+    sensors = (leader, auvest.RangeBearing(sigma_range_m=0.5))
+    random = np.random.default_rng(4)
+    truth = np.array([5.0, -3.0, 0.02, 0.0])[: len(process.state)]
+    filter_ = auvest.RobustUkf(
+        truth, np.diag(np.full(len(truth), 0.04)), process=process, sensors=sensors,
+        kernel="igg", dtype="float32",
+    )  # fmt: skip
+    sensor = np.arange(ROWS) % 2
+    dt = np.full(ROWS, 0.5)
+    driven = np.column_stack([np.full(ROWS, 1.5), 0.1 * np.arange(ROWS)])
+    z, place = np.full((ROWS, 2), np.nan), np.full((ROWS, 2), np.nan)
+    for k in range(ROWS):
+        truth = process.f(truth, dt[k], driven[k])
+        if sensor[k] == 0:
+            place[k] = 40.0 - k, 10.0 + 0.3 * k
+            model = auvest.LeaderRange(leader=tuple(place[k]))
+        else:
+            model = sensors[1]
+        if k % 5 != 4:
+            sizes = len(model.measures)
+            z[k, :sizes] = model.h(truth) + [0.2, 0.01][:sizes] * random.standard_normal(sizes)
+    z[20, 0] += 30.0
+    columns = (np.asarray(column, np.float32) for column in (dt, z, driven, place))
+    return Record(filter_, sensors, sensor, *columns)
+
+
+def test_the_record_asks_for_all_that_is_compared(record):
+    desk = on_desk(record)
+    decisions = {int(word) >> 8 & 0xFF for word in desk[:, 0]}
+    assert {int(auvest.Decision.accepted), int(auvest.Decision.rejected)} <= decisions
+    assert (desk[:, 0] & 0xFF == 0).all()
+
+
+@pytest.mark.usefixtures("_board")
+def test_the_simulated_mega_keeps_every_bit_and_says_what_it_takes(record, folder):
+    leg = hil.run(record, "atmega2560", folder)
+    assert leg.difference is None
+    assert leg.words.shape == (ROWS + 1, len(record.fields))
+    figures = leg.figures
+    assert figures["cycles_min"] < figures["cycles_median"] <= figures["cycles_max"]
+    assert 5_000 < figures["flash_bytes"] < 60_000
+    # Its own clock counts in 4 us, and in the interrupts that keep it.
+    slowest_us = figures["cycles_max"] / 16
+    assert leg.microseconds.max() == pytest.approx(slowest_us, rel=0.02, abs=8)
+    share = leg.awake_share(record)
+    assert share == pytest.approx(leg.microseconds[1:].sum() * 1e-6 / (0.5 * ROWS))
+
+
+@pytest.mark.parametrize("target", ["cortex-m4f"])
+def test_cortex_m_keeps_every_bit(record, folder, target):
+    leg = hil.run(record, target, folder)
+    assert leg.difference is None
+    assert leg.words.shape == (ROWS + 1, len(record.fields))
+    assert leg.microseconds is None
+
+
+def test_fused_multiply_add_of_a_chip_is_named(record, folder):
+    leg = hil.run(record, "cortex-m4f", folder, flags=("-ffp-contract=fast",))
+    assert leg.difference is not None
+    assert 1 <= leg.difference.row <= 5
+    assert leg.difference.ulp <= 64
+
+
+@pytest.mark.usefixtures("_board")
+def test_the_board_keeps_every_bit_over_a_line_that_damages_frames(record, folder, monkeypatch):
+    monkeypatch.setattr(hil_serial, "PATIENCE_S", 0.5)
+    noise = hil_line.Noise(0.1, seed=2)
+    with hil_line.behind_a_port("atmega2560", bench(record), folder, noise) as line:
+        leg = hil.run(record, f"serial:{line.port}", folder)
+    assert leg.difference is None
+    assert noise.damaged >= 5
+    assert leg.figures["repeated_rows"] >= 2
+    assert leg.microseconds.max() > 1000

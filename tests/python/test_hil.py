@@ -1,0 +1,366 @@
+"""`auvest hil`: rows of a log, the program for them, this computer as target, and the line.
+
+The chips' legs are in tests/firmware.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import family_support
+import numpy as np
+import pyarrow.parquet as pa_parquet
+import pytest
+from test_replay import SETTINGS, increments_log
+from typer.testing import CliRunner
+
+import auvest
+from auvest import telemetry
+from auvest.cli import app
+from auvest.firmware import hil, hil_serial
+from auvest.firmware.cost import registered
+from auvest.firmware.hil_bench import ANEW, Bench, answer_of, bench, row_frame
+from auvest.firmware.hil_record import Record, on_desk, place_names, record_of
+from auvest.logs import LogFolder
+from firmware.hil_line import Noise, behind_a_port
+
+CONFIG = """[start]
+sigma_position_m = 0.5
+sigma_heading_rad = 0.1
+[odometry]
+sigma_distance = 0.1
+sigma_drift = 0.05
+sigma_turn = 0.02
+[ranges]
+sigma_m = 0.3
+"""
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A log of 20 s with an outlier, and beside it its settings."""
+    folder = tmp_path_factory.mktemp("hil") / "log"
+    folder.mkdir()
+    increments_log(folder)
+    (folder.parent / "log.toml").write_text(CONFIG)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def record(log: Path) -> Record:
+    return record_of(LogFolder(log), SETTINGS)
+
+
+def family_record(kind: type[Any], name: str, **options: Any) -> Record:
+    """The record of the filters' tests: sensors in turn, missing rows, outliers, moved stations."""
+    filter_ = family_support.make(kind, name, "float32", **options)
+    given = family_support.record(filter_.process)
+    names = list(filter_.sensors)
+    driven = np.empty((len(given), 0)) if given.input is None else given.input
+    columns = (given.dt, given.z, driven, given.place)
+    return Record(
+        filter_,
+        tuple(filter_.sensors.values()),
+        np.array([names.index(name) for name in given.sensor]),
+        *(np.asarray(column, np.float32) for column in columns),
+    )
+
+
+def call(*arguments: str) -> Any:
+    return CliRunner().invoke(app, ["hil", *arguments])
+
+
+# ---- Rows and the desk ---------------------------------------------------------------------------
+
+
+def test_rows_are_those_that_a_replay_gives_to_its_filter(log: Path, record: Record) -> None:
+    """In float64 the same rows give the estimates that the replay writes down."""
+    from auvest.replay.engine import Localiser
+
+    replayed = Localiser(LogFolder(log), SETTINGS, "robust-ekf")
+    estimates = np.concatenate([b.estimates["x_m"] for b in replayed.batches()])
+    assert len(record) == 40 + 20  # a row per step, and one per range at its end
+    assert record.measured.sum() == 20
+    assert record.dt.sum() == 20
+    desk = on_desk(record)
+    x = desk[1:, 1].view(np.float32)
+    ends = np.append(np.flatnonzero(record.dt[1:] > 0), len(record) - 1)  # last rows of their times
+    np.testing.assert_allclose(x[ends], estimates, atol=1e-3)
+
+
+def test_the_desk_is_the_filter_in_float32(record: Record) -> None:
+    """The same bits as `run` gives, rows without measurement included."""
+    filter_ = auvest.RobustEkf(
+        record.filter.x, record.filter.P, process=record.filter.process,
+        sensors=record.sensors, dtype="float32",
+    )  # fmt: skip
+    result = filter_.run(
+        record.z, dt=record.dt, input=record.input, place=record.place,
+        sensor=record.sensors[0],
+    )  # fmt: skip
+    desk = dict(zip(record.fields, on_desk(record).T, strict=True))
+    nan = np.full(1, np.nan, np.float32)
+    assert np.array_equal(desk["x[y_m]"][1:], result.x[:, 1].copy().view(np.uint32))
+    assert np.array_equal(desk["nis"], np.concatenate([nan, result.nis]).view(np.uint32))
+    weight = np.concatenate([nan, result.weight[:, 0]])
+    assert np.array_equal(desk["weight[0]"], weight.view(np.uint32))
+    assert np.array_equal(desk["status"][1:] >> 8 & 0xFF, result.decision)
+    assert int(auvest.Decision.rejected) in result.decision  # the outlier
+
+
+def test_so_many_rows_as_are_wanted(log: Path) -> None:
+    assert len(record_of(LogFolder(log), SETTINGS, rows=7)) == 7
+
+
+def test_the_names_of_a_place_are_those_of_the_core() -> None:
+    assert place_names(auvest.LeaderRange()) == ["leader_x_m", "leader_y_m"]
+    assert place_names(auvest.BodyVelocity()) == ["heading_rad"]
+    assert place_names(auvest.Depth()) == []
+
+
+@pytest.mark.parametrize("name", family_support.BUILT_IN)
+def test_a_program_is_written_for_every_process_and_its_sensors(name: str) -> None:
+    record = family_record(auvest.Ckf, name)
+    program = bench(record)
+    assert "@" not in program.header
+    types = {registered()[model.core_name] for model in record.sensors}
+    assert program.header.count("using Sensor") == len(types)
+    assert len(program.rows) == len(record) + 1
+    assert f"kDigest = 0x{program.digest:08x}" in program.header
+
+
+def test_another_parameter_is_another_program(record: Record) -> None:
+    sensors = tuple(replace(model, sigma_range_m=0.31) for model in record.sensors)
+    assert bench(replace(record, sensors=sensors)).digest != bench(record).digest
+
+
+def test_what_a_bench_cannot_do_is_refused() -> None:
+    options: dict[str, Any] = {"process": auvest.Odometry(), "sensors": auvest.LeaderRange()}
+    rows = (np.zeros(1, int), *(np.zeros((1, n), np.float32) for n in (1, 1, 3, 2)))
+    for more, message in (
+        ({}, "float32"),
+        ({"dtype": "float32", "components": 16, "kernel": "igg"}, "components must be 1"),
+        ({"dtype": "float32", "late_s": 1.0}, "late_s must be 0"),
+    ):
+        filter_ = auvest.Ekf([0, 0, 0], np.eye(3), **options, **more)
+        with pytest.raises(ValueError, match=message):
+            Record(filter_, (auvest.LeaderRange(),), *rows)
+
+
+# ---- The comparison ------------------------------------------------------------------------------
+
+
+def test_the_first_difference_is_named_with_its_bits() -> None:
+    here = np.array([[0, 0x3F800000, 0x80000000], [0, 0x40000000, 0x7FC00000]], np.uint32)
+    names = ["status", "x[x_m]", "nis"]
+    assert hil.first_difference(here.copy(), here, names) is None
+    there = here.copy()
+    there[1, 1] += 3
+    found = hil.first_difference(there, here, names)
+    assert found is not None
+    assert (found.row, found.field, found.ulp) == (1, "x[x_m]", 3)
+    assert str(found) == (
+        "row 1, x[x_m]: 2.00000072 (40000003) there, 2 (40000000) on the desk, 3 ulp apart"
+    )
+    there[0, 2] = 1  # the smallest float beside -0
+    found = hil.first_difference(there, here, names)
+    assert found is not None
+    assert (found.row, found.field, found.ulp) == (0, "nis", 1)
+    there[0, 0] = 11
+    found = hil.first_difference(there, here, names)
+    assert found is not None
+    assert (found.field, found.target, found.ulp) == ("status", 11, None)
+
+
+def test_answers_that_are_not_one_per_row_are_no_comparison(record: Record) -> None:
+    program = bench(record)
+    answer = telemetry.frame("A," + ",".join(["00000000"] * 12))
+    with pytest.raises(hil.HilError, match="answered 1 of 61 rows"):
+        hil._table([answer], program, 10)
+    with pytest.raises(hil.HilError, match="refuses row 0: "):
+        hil._table([telemetry.frame("N,00000000")], program, 10)
+    with pytest.raises(hil.HilError, match="no answer: not a whole line"):
+        hil._table([answer[:-1] + "x"], program, 10)
+
+
+# ---- This computer as target ---------------------------------------------------------------------
+
+
+def test_a_log_on_this_computer(log: Path, record: Record, tmp_path: Path) -> None:
+    output = tmp_path / "out"
+    done = call(str(log), "--config", str(log.parent / "log.toml"), "--flags", "-O0",
+                "--output", str(output), "--json")  # fmt: skip
+    assert done.exit_code == 0, done.output
+    (leg,) = json.loads(done.stdout)["legs"]
+    assert (leg["target"], leg["rows"], leg["differing"]) == ("host", 60, 0)
+    assert leg["numbers"] == 61 * (1 + 3 + 6 + 1 + 1)
+    table = pa_parquet.read_table(output / "host.parquet")
+    assert (output / "host.parquet").read_bytes() == (output / "desk.parquet").read_bytes()
+    bits = np.ascontiguousarray(table["P[y_m, x_m]"].to_numpy()).view(np.uint32)
+    assert np.array_equal(bits, on_desk(record)[:, record.fields.index("P[y_m, x_m]")])
+    assert table["time_s"][-1].as_py() == 20
+    assert json.loads((output / "results.json").read_text())["legs"] == [leg]
+    assert (output / "bench" / "bench.ino").is_file()
+    assert "| host | 732 | 0 |" in (output / "README.md").read_text()
+
+
+def test_all_sensors_of_a_process_on_this_computer(tmp_path: Path) -> None:
+    """Six sensors in turn, where the station moves, a policy, parameters that are not the defaults;
+    a row that must be refused is refused there too, and the rows go on."""
+    record = family_record(
+        auvest.Aukf, "WhiteAcceleration3", policy=auvest.CovarianceBudget(position_sigma_m=3.0),
+        kernel=auvest.Igg(k0=1.2, k1=4.0), recovery=auvest.RejectionStreak(rejections=3),
+        alpha=0.5, longest_step_s=0.9,
+    )  # fmt: skip
+    desk = on_desk(record)
+    said = {auvest.Status(int(word) & 0xFF) for word in desk[:, 0]}
+    assert said == {auvest.Status.ok, auvest.Status.step_too_long}  # dt is 0.5, 0.75 or 1 s
+    assert len({int(word) >> 8 & 0xFF for word in desk[:, 0]}) == 3  # every decision
+    leg = hil.run(record, "host", tmp_path, desk=desk, flags=("-O0",))
+    assert leg.difference is None
+    assert leg.words.size == 61 * (1 + 6 + 21 + 1 + 3 + 1)
+
+
+@pytest.mark.skipif(
+    sys.platform != "linux" or " fma " not in Path("/proc/cpuinfo").read_text(),
+    reason="this processor has no fused multiply-add",
+)
+def test_fused_multiply_add_is_named_at_its_first_row(log: Path, tmp_path: Path) -> None:
+    done = call(str(log), "--config", str(log.parent / "log.toml"), "--json", "--output",
+                str(tmp_path / "out"), "--flags", "-mfma -ffp-contract=fast")  # fmt: skip
+    assert done.exit_code == 1
+    (leg,) = json.loads(done.stdout)["legs"]
+    first = leg["difference"]
+    assert leg["differing"] > 100
+    assert 1 <= first["row"] <= 2
+    assert 1 <= first["ulp"] <= 8
+    said = " ".join(done.stderr.split())
+    assert f"host differs from row {first['row']}, {first['field']}: " in said
+
+
+# ---- The line ------------------------------------------------------------------------------------
+
+
+def test_rows_come_through_a_line_that_damages_loses_and_doubles(
+    log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(hil_serial, "PATIENCE_S", 0.3)
+    record = record_of(LogFolder(log), SETTINGS)
+    noise = Noise(0.2, seed=3)
+    with behind_a_port("host", bench(record), tmp_path, noise) as line:
+        leg = hil.run(record, f"serial:{line.port}", tmp_path)
+    assert leg.difference is None
+    assert noise.damaged > 15
+    assert leg.figures["repeated_rows"] > 5
+
+
+class Script:
+    """A line whose other end says what is written here; None: nothing, for too long."""
+
+    def __init__(self, *said: str | None) -> None:
+        self.said, self.sent = list(said), []  # type: ignore[var-annotated]
+
+    def write(self, line: str) -> None:
+        self.sent.append(line)
+
+    def read(self, until_s: float) -> str | None:
+        del until_s
+        return self.said.pop(0) if self.said else None
+
+
+def says(kind: str, *words: int) -> str:
+    return telemetry.frame(",".join([kind, *(f"{word:08x}" for word in words)]))
+
+
+PROGRAM = Bench("", 0x1234, [row_frame(0, 5), row_frame(1, 6)])
+BOOT = says("B", 0x1234, 0)
+
+
+def test_a_row_is_sent_again_until_its_own_answer_comes() -> None:
+    line = Script(
+        BOOT, says("N", 0), "$A,garbage", None, says("A", 0, 7), says("A", 0, 7), says("A", 0, 7),
+        f"half a line{says('A', 1, 8)}",
+    )  # fmt: skip
+    figures: dict[str, int] = {}
+    assert hil_serial.play(line, PROGRAM, figures) == [says("A", 0, 7), says("A", 1, 8)]
+    assert line.sent == [PROGRAM.rows[0]] * 4 + [PROGRAM.rows[1]]
+    assert figures == {"damaged_frames": 2, "repeated_rows": 3}
+
+
+def test_a_board_that_has_not_restarted_is_asked_to_begin_anew() -> None:
+    line = Script(None, says("A", 9, 7), BOOT, says("A", 0, 7), says("A", 1, 8))
+    assert len(hil_serial.play(line, PROGRAM, {})) == 2
+    assert line.sent == [row_frame(ANEW), *PROGRAM.rows]
+
+
+@pytest.mark.parametrize(
+    ("said", "message"),
+    [
+        ((says("B", 0x1235, 0),), "the board runs the bench 00001235, not 00001234"),
+        ((), "no bench answers: load the sketch bench"),
+        ((BOOT, says("A", 0, 7), BOOT), "started anew at row 1"),
+        ((BOOT, says("A", 0, 7), says("N", 0)), "started anew at row 1"),
+        ((BOOT, says("A", 0, 7)), "row 1 was sent 20 times"),
+    ],
+)
+def test_what_is_wrong_with_a_board_is_said(said: tuple[str, ...], message: str) -> None:
+    with pytest.raises(hil_serial.LineLost, match=message):
+        hil_serial.play(Script(*said), PROGRAM, {})
+
+
+@pytest.mark.parametrize(
+    "line", [says("A", 1)[:-1], "$A,1*7c7f5f32", telemetry.frame("A,0000000g")]
+)
+def test_what_is_no_answer_is_refused(line: str) -> None:
+    with pytest.raises(telemetry.LineError):
+        answer_of(line)
+
+
+# ---- What is missing -----------------------------------------------------------------------------
+
+
+def test_wrong_usage_names_the_option(log: Path, tmp_path: Path) -> None:
+    output = ("--output", str(tmp_path / "out"))
+    for arguments, words in (
+        (
+            ("--target", "avr"),
+            "'avr' is not host, atmega2560, cortex-m3, cortex-m4f or serial:PORT",
+        ),
+        (("--target", "atmega2560", "--flags", "-O0"), "flags are not for atmega2560"),
+        (("--filter", "aukf"), "filter aukf chooses when to take a fix"),
+        (("--rows", "0"), "--rows"),
+    ):
+        done = call(str(log), *arguments, *output)
+        assert done.exit_code == 2, done.output
+        assert words in " ".join(done.stderr.replace("│", " ").split())
+    assert call(str(tmp_path / "no log"), *output).exit_code == 2
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_is_not_installed_is_named(
+    record: Record, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(hil.HilError, match="compiling for this computer failed"):
+        hil.run(record, "host", tmp_path, flags=("-fno-such-flag",))
+    monkeypatch.setattr(hil.shutil, "which", lambda name: None if "qemu" in name else "/bin/true")
+    with pytest.raises(hil.HilError, match="apt install qemu-system-arm"):
+        hil.run(record, "cortex-m3", tmp_path)
+    monkeypatch.setattr(shutil, "which", lambda _: None)
+    with pytest.raises(hil.HilError, match="apt install gcc-arm-none-eabi"):
+        hil.run(record, "cortex-m3", tmp_path)
+    monkeypatch.setitem(sys.modules, "serial", None)
+    with pytest.raises(hil_serial.LineLost, match=r"pip install 'auvest\[serial\]'"):
+        hil.run(record, "serial:/dev/ttyACM0", tmp_path)
+
+
+def test_a_port_that_is_not_there_leaves_the_sketch(log: Path, tmp_path: Path) -> None:
+    output = tmp_path / "out"
+    done = call(str(log), "--target", "serial:/dev/no-such-port", "--output", str(output))
+    assert done.exit_code == 1
+    assert "the sketch bench is in" in " ".join(done.stderr.split())
+    assert "#define AUVEST_BENCH_SERIAL 1" in (output / "bench" / "bench.ino").read_text()
