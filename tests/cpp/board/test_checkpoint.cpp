@@ -294,6 +294,15 @@ TEST_CASE("Checkpoints: an AUKF goes on with its interval and what the law remem
   for (int k = 0; k < 5; ++k) step(filter, k);
   Filter twin = resumed(filter, Filter{auvest::Ukf<Process>(Process())});
   CHECK(twin.interval() == filter.interval());
+  const auto& kept = filter.policy().memory;
+  const auto& again_kept = twin.policy().memory;
+  CHECK(kept.tau != filter.policy().params.tau0);  // no value that a fresh policy has
+  CHECK(again_kept.tau == kept.tau);
+  CHECK(again_kept.interval == kept.interval);
+  CHECK(again_kept.ratio == kept.ratio);
+  CHECK(again_kept.mahalanobis_squared == kept.mahalanobis_squared);
+  CHECK(again_kept.last_estimate == kept.last_estimate);
+  CHECK(again_kept.last_reference == kept.last_reference);
   for (int k = 5; k < 9; ++k) {
     step(filter, k);
     step(twin, k);

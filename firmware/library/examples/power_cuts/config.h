@@ -32,3 +32,6 @@ constexpr float kLargestRange = 75;
 constexpr float kStart[2] = {20, 20};
 constexpr float kSigmaStart = 5;
 constexpr float kSigmaVelocity = 0.5f;
+
+/// RAM that is kept for the stack, bytes.
+constexpr size_t kStackReserve = 700;

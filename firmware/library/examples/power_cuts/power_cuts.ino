@@ -56,8 +56,8 @@ float since_checkpoint = 0;  // [s]
 
 static_assert(auvest_board::fits(sizeof filter + sizeof checkpoints + sizeof instruments +
                                      sizeof telemetry + sizeof sample,
-                                 2048),
-              "the objects of this sketch leave less than 2048 bytes of RAM to the stack");
+                                 kStackReserve),
+              "the objects of this sketch leave less than kStackReserve bytes of RAM to the stack");
 
 // Of several results of a sample, the first that is not kOk is told.
 void note(auvest::Status status) {
