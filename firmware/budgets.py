@@ -364,6 +364,7 @@ def measure(output: Path) -> list[Row]:
     programs["replay"] = _run_replay
     programs["tracking_loop"] = _run_tracking_loop
     programs["slave_tracking"] = _run_slave_tracking
+    programs["beacon_navigation"] = _run_beacon_navigation
     programs["mission"] = _run_mission
     compiled = {}
     for program in programs:  # one after the other: they share Arduino's core
@@ -483,6 +484,29 @@ def _run_slave_tracking(compiled: Compiled, folder: Path) -> Row:
     return _row(folder.name, compiled, board.report.stack_bytes, [round(16 * us) for us in pairs])
 
 
+def _run_beacon_navigation(compiled: Compiled, folder: Path) -> Row:
+    """Measure 40 samples of a vehicle at rest, its ranges 2.3 s late: the cycles awake of each."""
+    reader = telemetry.Reader()
+    rows: list[telemetry.Row] = []
+    ranges = (14.142, 110.454, 94.340)  # of (10, 10) m from the sketch's beacons
+    with Board(compiled.elf, limit_s=60.0) as board:
+        for event in board:
+            if not isinstance(event, SerialLine):
+                continue
+            row = reader.read(event.text)
+            if isinstance(row, dict):
+                rows.append(row)
+            if len(rows) == 40:
+                break
+            sample = telemetry.requested_sample(event.text, "ODO")
+            if sample is not None:
+                board.send(telemetry.frame(f"MOTION,{sample},0.000,0.5000"), delay_s=0.005)
+                answer = telemetry.frame(f"RANGE,{sample},{ranges[sample % 3]:.3f}")
+                board.send(answer, delay_s=2.3)
+    cycles = [round(row["awake_us"] * 16) for row in rows[4:]]
+    return _row(folder.name, compiled, board.report.stack_bytes, cycles)
+
+
 def _run_mission(compiled: Compiled, folder: Path) -> Row:
     """Measure 60 s of a vehicle in the loop: the cycles awake per sample, telemetry's share too."""
     chip = ChipFlight(Vehicle(chip_mission()))
@@ -585,7 +609,8 @@ def page(rows: list[Row]) -> str:
         f"{ECHOES} times at the beginning of the paper's scenario. The examples: `first_steps` is",
         "its whole run, serial text included; `replay` counts predict, update and feedback by the",
         "chip's timer; `tracking_loop` counts the cycles awake between two samples,",
-        "`slave_tracking` those between two pings, serial text included, and `mission` those per",
+        "`slave_tracking` those between two pings, `beacon_navigation` those of a sample with a",
+        "range that is 3 s old, serial text included, and `mission` those per",
         "sample of 0.1 s. Its pilot by itself, in 100 s of the same mission: `pilot_steer` is",
         "guidance and control, `pilot_predict` heading and estimate, each twice because of late",
         "fixes, `pilot_update` one fix.",

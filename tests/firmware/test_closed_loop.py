@@ -313,7 +313,7 @@ def test_a_range_that_sound_cannot_reach_is_refused_by_the_filter(play, loops, o
 def test_what_cannot_be_is_implausible_and_not_taken(play, loops, on_the_desk):
     """A jump, a bearing that is none, two beyond the gate: named, counted, predicted only."""
     sound = noisy_sonar()
-    wrong = {20: (5.0, 0.0), 24: (0.0, 7.0), 28: (1.5, 0.0), 32: (0.0, 0.5)}
+    wrong = {20: (15.0, 0.0), 24: (0.0, 7.0), 28: (1.5, 0.0), 32: (0.0, 0.5)}
 
     def sonar(sample, r, bearing):
         more = wrong.get(sample, (0.0, 0.0))

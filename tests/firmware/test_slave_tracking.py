@@ -244,9 +244,9 @@ IMPLAUSIBLE, IMPOSSIBLE_RANGE = 14, 11  # of Status in auvest/status.hpp
 
 def test_what_cannot_be_is_named_and_not_taken(build_edited, play, on_the_host):
     """Beyond a limit of the value or of its change: counted, and as if it had not come."""
-    range_m = float(paper_world().readings["z"][7][0])
+    range_m = float(paper_world().readings["z"][3][0])
     readings = {3: (25.0, 0.5), 5: (5.0, 30.0), 7: (-21.0, 0.5)}
-    echoes = {4: (460.0, -1.5), 6: (300.0, 7.0), 8: (range_m + 110.0, -1.5)}
+    echoes = {4: (range_m + 110.0, -1.5), 6: (460.0, -1.5), 8: (300.0, 7.0)}
 
     def motion_(sample):
         if sample not in readings:
@@ -263,7 +263,7 @@ def test_what_cannot_be_is_named_and_not_taken(build_edited, play, on_the_host):
     wrong = [3, 4, 5, 6, 7, 8]
     assert [row["sample"] for row in run.rows if row["status"]] == wrong
     assert run.column("implausible").tolist() == [0, 0, 1, 2, 3, 4, 5, 6, 6, 6, 6, 6]
-    named = [IMPOSSIBLE_RANGE if sample == 4 else IMPLAUSIBLE for sample in wrong]
+    named = [IMPOSSIBLE_RANGE if sample == 6 else IMPLAUSIBLE for sample in wrong]
     assert [run.rows[sample - 1]["status"] for sample in wrong] == named
     assert not run.column("missed").any()
     for sample in wrong:
