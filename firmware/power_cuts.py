@@ -42,6 +42,8 @@ BEFORE = 21
 #: Bytes that the checkpoints have in the EEPROM of an ATmega2560, and one of the sketch.
 MEMORY = 4096 - 16
 SLOT = BEFORE + 4 * (4 + 10) + 30 + 4
+#: A start that lives for so long has been counted [s].
+COUNTED_S = 0.1
 _YEAR_S = 365.25 * 86400
 
 
@@ -157,18 +159,25 @@ def attack(
     longest_off_s: float = 60.0,
     runner: Path | None = None,
 ) -> Found:
-    """Cut the power of a board with the sketch ``power_cuts`` so often, and let it start again."""
+    """Cut the power of a board with the sketch ``power_cuts`` so often, and let it start again.
+
+    The board is off for up to ``longest_off_s``, with what starts it has in between that are too
+    short to be counted.
+    """
     dice = random.Random(seed)
     found, history, craft = Found(), History(), Craft()
     with tempfile.TemporaryDirectory() as folder:
-        eeprom, clock = Path(folder) / "eeprom", False
+        eeprom, clock, left_s = Path(folder) / "eeprom", False, longest_off_s
         for cut in range(cuts):
             life_s = dice.uniform(0, 0.7 if dice.random() < 0.3 else longest_life_s)
             clock ^= dice.random() < 0.2
             before = newest(eeprom.read_bytes()) if eeprom.exists() else None
             _live(elf, eeprom, life_s, cut, clock, before, history, craft, found, runner)
             found.cuts += 1
-            history.now_s += life_s + dice.uniform(0, longest_off_s)
+            left_s = longest_off_s if life_s > COUNTED_S else left_s - life_s
+            off_s = dice.uniform(0, max(left_s, 0.0))
+            left_s -= off_s
+            history.now_s += life_s + off_s
     return found
 
 
