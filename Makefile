@@ -11,6 +11,8 @@ VENV := $(or $(VIRTUAL_ENV),$(CURDIR)/.venv)
 PY := $(VENV)/bin/python
 SUDO := $(if $(filter 0,$(shell id -u)),,sudo)
 export CTEST_OUTPUT_ON_FAILURE := 1
+# Ninja alone would take two more, and check runs it beside the tests of Python and firmware.
+export CMAKE_BUILD_PARALLEL_LEVEL := $(shell nproc)
 
 # What Debian provides: to build and run, and beyond that to test and lint.
 PACKAGES := g++ cmake ninja-build libeigen3-dev libxsimd-dev python3-dev python3-venv
@@ -128,7 +130,7 @@ test-cpp: build-release ## the C++ tests that run for seconds, optimised, and th
 
 # All of them with the other compiler and the newest standard, under the address and
 # undefined-behaviour sanitizers; build-release has gcc and C++11, the Python module C++17. (Any pair
-# has a target; each takes minutes.)
+# has a target; each takes minutes.) That benchmarks and tools compile is shown here, too.
 MATRIX := matrix-clang-20
 PAIRS := $(foreach compiler,gcc clang,$(foreach std,11 14 17 20,matrix-$(compiler)-$(std)))
 test-cpp-matrix: $(MATRIX) ## the C++ tests under sanitizers: clang, C++20
@@ -136,6 +138,7 @@ test-cpp-matrix: $(MATRIX) ## the C++ tests under sanitizers: clang, C++20
 .PHONY: $(PAIRS) build-release
 $(PAIRS): matrix-%: setup-dev
 	cmake -S . -B build/$@ -G Ninja --log-level=WARNING -D AUVEST_BUILD_TESTS=ON \
+	    -D AUVEST_BUILD_BENCHMARKS=ON -D AUVEST_BUILD_TOOLS=ON \
 	    -D AUVEST_SANITIZE=ON -D CMAKE_BUILD_TYPE=Debug -D CMAKE_CXX_FLAGS_DEBUG=-g1 \
 	    -D CMAKE_CXX_COMPILER=$(if $(findstring clang,$@),clang++,g++) \
 	    -D CMAKE_CXX_STANDARD=$(lastword $(subst -, ,$@))
@@ -144,8 +147,7 @@ $(PAIRS): matrix-%: setup-dev
 
 build-release: setup-dev
 	cmake -S . -B build/release -G Ninja --log-level=WARNING -D AUVEST_BUILD_TESTS=ON \
-	    -D AUVEST_LONG_TESTS_ONLY=ON -D AUVEST_BUILD_EXAMPLES=ON -D AUVEST_BUILD_BENCHMARKS=ON \
-	    -D AUVEST_BUILD_TOOLS=ON
+	    -D AUVEST_LONG_TESTS_ONLY=ON -D AUVEST_BUILD_EXAMPLES=ON
 	cmake --build build/release
 
 # What libFuzzer finds goes to build/fuzz/crash-*. A long run is worth optimised code:
@@ -163,17 +165,22 @@ fuzz: setup-dev ## libFuzzer on the filters: SECONDS=15, PRECISION=float
 
 # ---- Measure -------------------------------------------------------------------------------------
 
-.PHONY: bench math-accuracy
-bench: build-release install-editable ## time per step beside filterpy, NumPy, Numba; time to start
-	$(PY) cpp/benchmarks/speed.py build/release/cpp/benchmarks/ukf_step --write docs/speed.md
+.PHONY: bench math-accuracy build-measure
+build-measure: setup-dev
+	cmake -S . -B build/measure -G Ninja --log-level=WARNING -D AUVEST_BUILD_BENCHMARKS=ON \
+	    -D AUVEST_BUILD_TOOLS=ON
+	cmake --build build/measure
+
+bench: build-measure install-editable ## time per step beside filterpy, NumPy, Numba; time to start
+	$(PY) cpp/benchmarks/speed.py build/measure/cpp/benchmarks/ukf_step --write docs/speed.md
 	OPENBLAS_NUM_THREADS=1 $(PY) cpp/benchmarks/slat_speed.py \
-	    build/release/cpp/benchmarks --write docs/speed_slat.md
+	    build/measure/cpp/benchmarks --write docs/speed_slat.md
 	OPENBLAS_NUM_THREADS=1 $(PY) cpp/benchmarks/vehicle_speed.py \
-	    build/release/cpp/benchmarks --write docs/speed_vehicle.md
+	    build/measure/cpp/benchmarks --write docs/speed_vehicle.md
 	$(PY) cpp/benchmarks/startup.py --write docs/speed_startup.md
 
-math-accuracy: build-release ## errors of the float functions over all 2^32 arguments
-	build/release/cpp/tools/math_accuracy
+math-accuracy: build-measure ## errors of the float functions over all 2^32 arguments
+	build/measure/cpp/tools/math_accuracy
 
 # ---- Check ---------------------------------------------------------------------------------------
 

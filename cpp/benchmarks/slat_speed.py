@@ -1,6 +1,6 @@
 r"""Speed of SLATF in float32: time per particle and sonar step beside NumPy and Numba, one thread.
 
-    OPENBLAS_NUM_THREADS=1 python cpp/benchmarks/slat_speed.py build/release/cpp/benchmarks \
+    OPENBLAS_NUM_THREADS=1 python cpp/benchmarks/slat_speed.py build/measure/cpp/benchmarks \
         [--write docs/speed_slat.md]
 
 All filters do the same work: poses of three states drawn from noisy speed and yaw rate, one master

@@ -1,6 +1,6 @@
 """Speed of filters: instructions of a UKF step, times beside filterpy and Numba, single steps.
 
-    python cpp/benchmarks/speed.py build/release/cpp/benchmarks/ukf_step [--write docs/speed.md]
+    python cpp/benchmarks/speed.py build/measure/cpp/benchmarks/ukf_step [--write docs/speed.md]
 
 The instructions are callgrind's, hence exact. The times are the processor's, taken in turn, round
 by round, so that their ratios hold when the machine's speed drifts; only the ratios travel to

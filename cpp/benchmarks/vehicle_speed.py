@@ -1,6 +1,6 @@
 """Speed of a hull: one RK4 step in six degrees of freedom beside NumPy and Numba, one thread.
 
-    OPENBLAS_NUM_THREADS=1 python cpp/benchmarks/vehicle_speed.py build/release/cpp/benchmarks \
+    OPENBLAS_NUM_THREADS=1 python cpp/benchmarks/vehicle_speed.py build/measure/cpp/benchmarks \
         [--write docs/speed_vehicle.md]
 
 All fly the torpedo ``remus100`` with all its loads, from the same start with the same commands, and

@@ -205,6 +205,9 @@ class SlatModel : public bindings::SlatInterface<typename Filter::Scalar, Filter
   }
 
  protected:
+  /// Whether what the filter keeps behind its slave and masters is sound, too.
+  virtual bool is_sound() const = 0;
+
   struct Echoes {
     explicit Echoes(const Heard& heard) {
       for (int s = 0; s < heard.count; ++s) {
@@ -246,7 +249,7 @@ class SlatModel : public bindings::SlatInterface<typename Filter::Scalar, Filter
       this->master(n, master.x, master.P);
       sound = check_slave(master) == Status::kOk;
     }
-    return sound;
+    return sound && is_sound();
   }
 };
 
@@ -321,6 +324,9 @@ class SlatfModel final : private Numbers<typename Filter::Scalar>, public SlatMo
       }
     }
   }
+
+ private:
+  bool is_sound() const override { return this->filter_.is_sound(); }
 };
 
 /// EkfSlat or DeadReckoning.
@@ -361,6 +367,15 @@ class GaussianSlatModel final : public SlatModel<Filter> {
   void particles(Scalar*, Scalar*) const override {}
 
  private:
+  bool is_sound() const override { return is_sound(this->filter_); }
+  template <class Motion>
+  static bool is_sound(const DeadReckoning<Motion>&) {
+    return true;
+  }
+  template <class Other>
+  static bool is_sound(const Other& filter) {
+    return filter.is_sound();
+  }
   template <class Motion>
   static Belief<Scalar, 6> master_of(const DeadReckoning<Motion>&, int) {
     return Belief<Scalar, 6>();

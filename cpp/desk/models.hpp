@@ -30,9 +30,10 @@ namespace desk {
 template <class Scalar>
 struct AnyProcess {
   const int states;
+  const int position_states;  ///< as ProcessModel's kPosition
   const int inputs;
 
-  AnyProcess(int n, int u) : states(n), inputs(u) {}
+  AnyProcess(int n, int position, int u) : states(n), position_states(position), inputs(u) {}
   virtual ~AnyProcess() = default;
 
   /// The state (states) after dt seconds, the Jacobian and the noise covariance (states, states).
@@ -60,7 +61,8 @@ struct ProcessFor : AnyProcess<Scalar> {
   using Input = Vector<Scalar, kMaxInputs>;
   const bool translates;  ///< as ProcessModel's kTranslation
 
-  ProcessFor(int u, bool moves_all_alike) : AnyProcess<Scalar>(N, u), translates(moves_all_alike) {}
+  ProcessFor(int position, int u, bool moves_all_alike)
+      : AnyProcess<Scalar>(N, position, u), translates(moves_all_alike) {}
 
   virtual Status predict(const AnyLinearisation<Scalar>& how, Belief<Scalar, N>& belief, Scalar dt,
                          const Input& input) const = 0;
@@ -82,6 +84,7 @@ struct RuntimeProcess {
     return model->position_variance(belief, dt, input);
   }
   bool translates() const { return model->translates; }
+  int position_states() const { return model->position_states; }
 };
 
 /// After a step of `Filter` from the belief `before`: what restore() does not take has its lost
@@ -241,7 +244,7 @@ class ProcessOf final : public ProcessFor<typename Process::Scalar, Process::kSt
 
   /// `count`: how many of the numbers of the model's input count.
   explicit ProcessOf(const Process& process, int count = kInputs)
-      : Base(count, Process::kTranslation), process_(process) {}
+      : Base(Process::kPosition, count, Process::kTranslation), process_(process) {}
 
   const Process& process() const { return process_; }
 

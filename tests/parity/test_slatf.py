@@ -40,6 +40,15 @@ ON_CHIP = all_records(chip=True)
 SHORT = 20
 
 
+#: The compilers of other targets with other flags, minutes of them: with AUVEST_SLOW_TESTS set.
+SLOW = {"clang-O0", "atmega2560-O2", "cortex-m3"}
+
+
+def targets():
+    slow = "AUVEST_SLOW_TESTS" in os.environ
+    return [target for target in SLATF_TARGETS if slow or target.name not in SLOW]
+
+
 def names_for(target):
     """The records of a target. Its program in lanes has the Slatf with one model of a master."""
     names = ON_CHIP if target.machine == "avr" else RECORDS
@@ -74,7 +83,7 @@ def traces(build, runner, tmp_path_factory):
         return found
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        first = sorted(SLATF_TARGETS, key=lambda target: target.machine != "avr")
+        first = sorted(targets(), key=lambda target: target.machine != "avr")
         jobs = {target.name: pool.submit(replay, target) for target in first}
     return lambda target, name: jobs[target.name].result()[name]
 
@@ -120,8 +129,10 @@ def first_difference(expected, found):
 
 def pairs():
     for target in SLATF_TARGETS[1:]:
+        left_out = target not in targets()
+        marks = pytest.mark.skipif(left_out, reason="AUVEST_SLOW_TESTS is not set")
         for name in names_for(target):
-            yield pytest.param(target, name, id=f"{target.name}-{name}")
+            yield pytest.param(target, name, id=f"{target.name}-{name}", marks=marks)
 
 
 @pytest.mark.parametrize(("target", "name"), list(pairs()))

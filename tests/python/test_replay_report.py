@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import json
-import os
 import re
-import shutil
-import subprocess
 from html import unescape
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from processes import PATIENCE_S
+from browser import dom_of
 
 from auvest.logs import LogFolder
 from auvest.logs.write import write_file
@@ -32,29 +29,14 @@ addEventListener("load", () => {
 </script>"""
 
 
-def browser() -> str:
-    found = shutil.which("chromium") or shutil.which("chromium-browser")
-    if found is None:
-        pytest.fail("no browser: apt-get install chromium (make setup-dev installs it)")
-    return found
-
-
 def opened(page: str, folder: Path) -> dict[str, Any]:
     """What the browser says about a page, without a network."""
     path = folder / "page.html"
     assert page.count("<head>") == 1
     path.write_text(page.replace("<head>", f"<head>{PROBE}"), encoding="utf-8")
-    command = [
-        browser(), "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage",
-        f"--user-data-dir={folder / 'profile'}", "--host-resolver-rules=MAP * ~NOTFOUND",
-        "--virtual-time-budget=10000", "--dump-dom", path.as_uri(),
-    ]  # fmt: skip
-    done = subprocess.run(
-        command, capture_output=True, text=True, timeout=PATIENCE_S, check=True,
-        env={**os.environ, "HOME": str(folder)},
-    )  # fmt: skip
-    seen = re.search(r'data-seen="([^"]*)"', done.stdout)
-    assert seen is not None, done.stderr[-2000:]
+    shown, said = dom_of(path.as_uri(), folder)
+    seen = re.search(r'data-seen="([^"]*)"', shown)
+    assert seen is not None, said[-2000:]
     value: dict[str, Any] = json.loads(unescape(seen[1]))
     return value
 

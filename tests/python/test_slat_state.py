@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import multiprocessing
 import pickle
+import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -22,6 +24,7 @@ NAMES = (
     "births",
     "joint1",
     "joint2",
+    "shared",
     "ekf",
     "ekf_imm",
     "reckoning",
@@ -78,7 +81,8 @@ def started(name: str, dtype: str) -> Any:
 
 
 def drive(filter_: Any, heard: Any) -> None:
-    unknown = auvest.UNKNOWN_MASTER
+    # Particles with one covariance cannot differ in whose echo it was.
+    unknown = 0 if filter_._shared else auvest.UNKNOWN_MASTER
     for k, z in enumerate(heard):
         if z is not None and filter_.motion.pose_states == 2:
             z = (z[0], -z[1])  # from the master
@@ -374,6 +378,32 @@ def test_the_core_refuses_numbers_that_are_not_a_state(name: str) -> None:
     after = core.save()
     assert np.array_equal(after["numbers"], numbers)
     assert np.array_equal(after["counts"], counts)
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if name != "reckoning"])
+def test_a_covariance_that_is_none_is_refused_wherever_the_filter_keeps_it(name: str) -> None:
+    # One number of the state is far too large, in places over all of it. What is taken all the same
+    # (a mean, a variance, a weight) stays a number.
+    filter_ = started(name, "float32")
+    numbers, counts = (filter_._core_steps.save()[part] for part in ("numbers", "counts"))
+    refused = 0
+    for place in np.unique(np.linspace(0, len(numbers) - 1, 400).astype(int)):
+        changed = numbers.copy()
+        changed[place] = 1e9
+        other = copy.deepcopy(filter_)
+        try:
+            other._core_steps.restore(changed, counts)
+        except ValueError:
+            refused += 1
+            continue
+        with contextlib.suppress(auvest.FilterError), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            drive(other, HEARD[:3])
+        for n in range(other.masters):
+            assert all(np.isfinite(part).all() for part in other.master(n)), place
+        assert np.isfinite(other.x).all(), place
+        assert np.isfinite(other.P).all(), place
+    assert refused > 0
 
 
 def test_the_status_is_pickled() -> None:

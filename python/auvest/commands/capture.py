@@ -3,6 +3,7 @@
 The sketch runs on an Arduino at --port, or on a simulated one with --simulator, where the vehicle
 and its sonar are simulated too. --play-sonar simulates them for a board that has no sonar.
 Any sketch is recorded that names its columns, as tracking_loop does ($COLUMNS, telemetry.h).
+In a terminal the last samples are drawn while they come; --live draws all of them on a page.
 Every sample is in the CSV file as soon as it has come, with all the bits of its floats, until the
 end in a folder whose name ends in .unfinished; Ctrl-C ends a recording and keeps it. Where the
 board was reset under way, a new section of the file begins.
@@ -13,7 +14,7 @@ Examples
 
   auvest capture --simulator tracking_loop.ino.elf --noise lognormal --dropout 0.2
 
-  auvest capture --port /dev/ttyACM0 --output dive-7
+  auvest capture --port /dev/ttyACM0 --output dive-7 --live
 
   auvest capture --port /dev/ttyACM0 --play-sonar --steps 60
 """
@@ -23,6 +24,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -36,6 +38,7 @@ from auvest.board import Board, BoardError, Finished, PinChange, SerialLine
 from auvest.commands import options
 from auvest.commands.console import Terminal, table
 from auvest.commands.exit_codes import ExitCode
+from auvest.commands.live import LivePage, terminal_view
 from auvest.commands.options import WORLD, fraction, option, refuse_given
 from auvest.commands.session import Floats, Session
 from auvest.simulation import paper_aukf
@@ -312,6 +315,9 @@ def command(
         float, option(WORLD, "Probability that an answer never comes.", check=fraction)
     ] = 0.0,
     seed: options.Seed = 1,
+    live: Annotated[
+        bool, typer.Option("--live", help="Serve a page that draws the recording; says where.")
+    ] = False,
     output: options.Output = Path("auvest-output/capture"),
     force: options.Force = False,
     no_figure: options.NoFigure = False,
@@ -351,7 +357,15 @@ def command(
 
     with terminal.writing(output):
         recording = Recording(session.part / path.name, sonar)
-        with terminal.progress("samples") as progress:
+        source = settings["source"]
+        with ExitStack() as shown:
+            if live:
+                page = shown.enter_context(LivePage(recording, Path(source).name))
+                terminal.warn(f"the recording is drawn at {page.url}")
+            bars = terminal.shows_bars
+            progress = shown.enter_context(
+                terminal.progress("samples", lambda: terminal_view(recording, bars=bars))
+            )
 
             def wanted() -> bool:
                 done = len(recording.rows)
@@ -377,7 +391,6 @@ def command(
         terminal.fail(f"no sample has come: {why}", code)
 
     values = measures(recording, simulated=simulator is not None)
-    source = settings["source"]
     for restart in recording.restarts:
         terminal.warn(
             f"the board restarted after {restart.after_s:.6g} s: section {restart.section} begins; "

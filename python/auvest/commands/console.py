@@ -15,9 +15,16 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import typer
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    TextColumn,
+    TimeRemainingColumn,
+)
 from rich.table import Table
 from rich.text import Text
 
@@ -38,6 +45,21 @@ def discard_unpublished() -> None:
         new.discard()
         if new.left is not None:
             typer.echo(f"Note: what was recorded is in {shown(new.left)}", err=True)
+
+
+class _Progress(Progress):
+    """A bar, and what is drawn above it."""
+
+    def __init__(
+        self, *columns: ProgressColumn, view: Callable[[], RenderableType] | None, **options: Any
+    ) -> None:
+        self._view = view
+        super().__init__(*columns, **options)
+
+    def get_renderables(self) -> Iterable[RenderableType]:
+        if self._view is not None:
+            yield self._view()
+        yield from super().get_renderables()
 
 
 class Terminal:
@@ -76,9 +98,19 @@ class Terminal:
         self._err.print(f"[bold red]Error:[/] {escape(shown(message, lines=True))}")
         raise typer.Exit(int(code))
 
+    @property
+    def shows_bars(self) -> bool:
+        """Whether stderr can show the letters that bars are drawn with."""
+        return not self._messages.options.ascii_only
+
     @contextmanager
-    def progress(self, what: str) -> Iterator[ProgressCallback]:
-        """Show a bar on stderr that is gone when the work is done, if it is a terminal."""
+    def progress(
+        self, what: str, view: Callable[[], RenderableType] | None = None
+    ) -> Iterator[ProgressCallback]:
+        """Show a bar on stderr that is gone when the work is done, if it is a terminal.
+
+        ``view`` is drawn above it, some ten times a second.
+        """
         columns = (
             TextColumn("{task.description}"),
             BarColumn(),
@@ -86,7 +118,8 @@ class Terminal:
             TimeRemainingColumn(),
         )
         hidden = self._messages.quiet or not self._messages.is_terminal
-        with Progress(*columns, console=self._messages, transient=True, disable=hidden) as bar:
+        options: dict[str, Any] = {"console": self._messages, "transient": True, "disable": hidden}
+        with _Progress(*columns, view=view, **options) as bar:
             task = bar.add_task(what, total=None)
             yield lambda done, total: bar.update(task, completed=done, total=total)
 

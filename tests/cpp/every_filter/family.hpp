@@ -27,6 +27,7 @@ struct Checked {
 /// A process of the registry with its default parameters.
 struct Process {
   int states = 0;
+  int position_states = 0;
   int inputs = 0;
   bool linear = false;  ///< f is linear in x, says the model
 

@@ -107,6 +107,7 @@ struct ProcessOf final : Process {
 
   ProcessOf() {
     states = Model::kStates;
+    position_states = Model::kPosition;
     inputs = InputOf<Model>::size();
     linear = Model::kLinear;
   }

@@ -548,10 +548,11 @@ TEST_CASE("every filter: a position so large that the format is coarse against P
     const double far = std::ldexp(1.0, single ? 22 : 51);
     const std::size_t n = static_cast<std::size_t>(member.process->states);
     Numbers p0 = prior(member);
-    for (std::size_t i = 0; i < 2; ++i) {
+    const std::size_t axes = static_cast<std::size_t>(member.process->position_states);
+    for (std::size_t i = 0; i < axes; ++i) {
       for (std::size_t j = 0; j < n; ++j) p0[i * n + j] = p0[j * n + i] = i == j ? 1 : 0;
     }
-    for (const std::size_t axis : {0u, 1u}) {
+    for (std::size_t axis = 0; axis < axes; ++axis) {
       Numbers x0 = start(member);
       x0[axis] = -far;
       const auto filter = begun(member, member.whole());

@@ -483,8 +483,10 @@ TEST_CASE_TEMPLATE("Imm: a turn is recognised, and its end", Scalar, float, doub
 // ---- What must not happen
 // -------------------------------------------------------------------------------
 
+// Without a gate an echo of 9e8 m may carry the belief to where a float is coarse, which the filter
+// then says; behind a gate it may not.
 template <class Filter>
-void check_survival(Filter& filter) {
+void check_survival(Filter& filter, bool gated) {
   Random random(31), world(32);
   REQUIRE(filter.reset(slave_belief<float>(0.01), random) == Status::kOk);
   REQUIRE(filter.add_master(master_belief<float>(60, 80)) == Status::kOk);
@@ -493,7 +495,8 @@ void check_survival(Filter& filter) {
   for (int k = 0; k < 300; ++k) {
     // Silence of 200 s, then echoes of which each third is wrong by anything.
     const float dt = k == 150 ? 200 : k % 7 == 0 ? 0.0f : 0.5f;
-    REQUIRE(filter.predict(dt, Vector<float, 2>(2, 0.05f), random) == Status::kOk);
+    const Status predicted = filter.predict(dt, Vector<float, 2>(2, 0.05f), random);
+    REQUIRE((predicted == Status::kOk || (!gated && predicted == Status::kFarFromOrigin)));
     Echo<float> seen;
     seen.master = 0;
     seen.z << 100 + world.normal<float>(), -2 + 0.06f * world.normal<float>();
@@ -521,12 +524,12 @@ TEST_CASE("Imm: whatever is heard, and after a long silence, numbers stay number
     Joint::Params joint_params;
     joint_params.gate = gate;
     Joint joint(Unicycle<float>(), three_models<float>(0.1), joint_params);
-    check_survival(joint);
+    check_survival(joint, gate > 0);
     using Filter = auvest::Slatf2<Unicycle<float>, Three<float>, 1>;
     Filter::Params params;
     params.gate = gate;
     Owner<Filter> owner(Unicycle<float>(), three_models<float>(0.1), 40, params);
-    check_survival(owner.filter);
+    check_survival(owner.filter, gate > 0);
   }
 }
 

@@ -277,13 +277,15 @@ void check_far_places() {
   CHECK(filter.add_master(master) == Status::kFarFromOrigin);
   CHECK(filter.masters() == 0);
   master.x(0) = 4000;
-  for (const int i : {2, 5}) {  // as large as the mean of several models cannot be formed
-    auto large = master;
-    large.x(i) = -3e38f;
-    CHECK(filter.add_master(large) == Status::kOverflow);
-    large = master;
-    large.P(i, i) = 3e38f;
-    CHECK(filter.add_master(large) == Status::kOverflow);
+  for (const int i : {2, 5}) {  // beyond any speed or acceleration; an Imm squares their products
+    for (const float beyond : {1.01f, 1e19f}) {
+      auto large = master;
+      large.x(i) = -1e6f * beyond;
+      CHECK(filter.add_master(large) == Status::kOverflow);
+      large = master;
+      large.P(i, i) = 1e12f * beyond;
+      CHECK(filter.add_master(large) == Status::kOverflow);
+    }
   }
   CHECK(filter.masters() == 0);
   CHECK(filter.add_master(master) == Status::kOk);

@@ -45,9 +45,8 @@ class GaussianFilter {
     math::set_zero(belief_.P);
   }
 
-  /// Sets the belief. Only the lower triangle of P0 is read. kFarFromOrigin where the position, the
-  /// first two states, is too large for the format to tell apart what P0 does: coordinates count
-  /// from an origin nearby.
+  /// Sets the belief. Only the lower triangle of P0 is read. kFarFromOrigin where the position is
+  /// too large for the format to tell apart what P0 does: coordinates count from an origin nearby.
   Status reset(const State& x0, const Covariance& P0) {
     if (check() != Status::kOk) return check();
     if (!math::all_finite(x0) || !math::lower_finite(P0)) return Status::kNotFinite;
@@ -207,10 +206,10 @@ class GaussianFilter {
     return Status::kOk;
   }
 
-  /// Whether the format is coarse at one of the first two states, the position, against P.
-  AUVEST_OUTLINE static bool is_far(const State& x, const Covariance& P) {
+  /// Whether the format is coarse at the position against P.
+  AUVEST_OUTLINE bool is_far(const State& x, const Covariance& P) const {
     bool far = false;
-    for (int i = 0; i < (kStates < 2 ? kStates : 2); ++i) {
+    for (int i = 0; i < process_.position_states(); ++i) {
       far = far || math::is_coarse(x(i), P(i, i));
     }
     return far;

@@ -16,6 +16,7 @@
 //     propagate(belief, dt)  x <- f, P <- Phi P Phi' + Q in place, from the structure of Phi
 //     kLinear                true if f is linear in x: the UKF then calls propagate, which is exact
 //     kTranslation           true if f moves every state by the same, and Q does not depend on x
+//     kPosition              how many of the first states are the position: 2
 //     Input, input           type and value of what drives the process (a Vector), for
 //                            predict(dt, input)
 //     position_variance(belief, dt)
@@ -38,8 +39,10 @@ struct ProcessModel {
   static constexpr bool kLinear = false;
   static constexpr bool kClosedForm = false;
   static constexpr bool kTranslation = false;
+  static constexpr int kPosition = N < 2 ? N : 2;
 
   static constexpr bool translates() { return Derived::kTranslation; }
+  static constexpr int position_states() { return Derived::kPosition; }
 
   /// f about x, with deviations by subtraction: f(x + e) - f(x) loses the digits that f(x) and
   /// f(x + e) share, so filters limit how small alpha may be (see SigmaPoints).

@@ -40,6 +40,7 @@ struct WhiteAcceleration : ProcessModel<WhiteAcceleration<Scalar_, Axes>, Scalar
   using typename Base::Covariance;
   using typename Base::State;
   static constexpr bool kLinear = true;
+  static constexpr int kPosition = Axes;
 
   using Params = WhiteAccelerationParams<Scalar>;
 

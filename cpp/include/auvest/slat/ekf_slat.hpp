@@ -144,6 +144,9 @@ class EkfSlat : public SlatFilter<Motion_, Masters, Safeguards_> {
     visit(self.nis_);
   }
 
+  /// Whether the covariance of slave and masters is one: to ask of a state that was put back.
+  bool is_sound() const { return check_slave(belief_) == Status::kOk; }
+
  private:
   using Frame::log_likelihood_;
   using Frame::masters_;

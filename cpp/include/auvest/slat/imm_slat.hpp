@@ -110,6 +110,17 @@ struct MasterBank<Imm<Models...>, Lanes> {
     return weight_of(Value(Lanes::load(at + (kWeightField + k) * kBlock)));
   }
 
+  /// Whether the numbers of one particle are those of a bank.
+  static bool is_sound(const Scalar* at) {
+    bool sound = is_belief<6>(at);
+    Scalar sum(0);
+    for (int k = 0; k < kModes; ++k) {
+      sound = sound && is_belief<6>(at + (kModeField + k * kGaussian) * kBlock);
+      sum = sum + weight_of(at[(kWeightField + k) * kBlock]);
+    }
+    return sound && math::absolute(sum - Scalar(1)) < Scalar(1e-3);
+  }
+
  private:
   using Weights = Vector<Value, kModes>;
 
@@ -305,6 +316,14 @@ class EkfSlat<Motion_, Imm<Models...>, Masters, Safeguards_>
     visit(self.log_weight_);
     visit.count(self.hypotheses_, kHypotheses);
     visit(self.nis_);
+  }
+
+  /// Whether the hypotheses have covariances: to ask of a state that was put back.
+  bool is_sound() const {
+    for (int h = 0; h < hypotheses_; ++h) {
+      if (check_slave(belief_[h]) != Status::kOk) return false;
+    }
+    return true;
   }
 
  private:

@@ -6,6 +6,7 @@
 #include "auvest/math/linear_algebra.hpp"
 #include "auvest/particles/mixture.hpp"
 #include "auvest/slat/echo.hpp"
+#include "auvest/slat/slat_filter.hpp"
 #include "auvest/types.hpp"
 
 namespace auvest {
@@ -31,6 +32,9 @@ struct MasterBank {
     if (change != nullptr) add_planned_change(*change, dt, belief.x);
     store_belief<Lanes>(at, belief);
   }
+
+  /// Whether the numbers of one particle are those of a bank.
+  static bool is_sound(const Scalar* at) { return is_belief<6>(at); }
 };
 
 }  // namespace AUVEST_INSTRUCTIONS

@@ -17,7 +17,9 @@
 #include "auvest/math/random.hpp"
 #include "auvest/math/resolution.hpp"
 #include "auvest/models/sonar.hpp"
+#include "auvest/particles/lanes.hpp"
 #include "auvest/particles/log_weights.hpp"
+#include "auvest/particles/mixture.hpp"
 #include "auvest/particles/particle_set.hpp"
 #include "auvest/particles/resampling.hpp"
 #include "auvest/slat/echo.hpp"
@@ -68,25 +70,47 @@ AUVEST_OUTLINE bool is_far(const Belief<Scalar, N>& belief) {
          math::is_coarse(belief.x(1), belief.P(1, 1));
 }
 
-/// What a start says of a belief of n states: kOverflow where a number or a sigma is beyond 1e9, as
-/// an echo, or a variance so small that sums of products or its inverse would not be finite in
-/// single precision; kFarFromOrigin where the format is coarse at its position
+/// The largest number or sigma of state i: a position as an echo, and speeds, accelerations and
+/// angles far beyond any, whose products with those of other states are still finite.
+template <class Scalar>
+constexpr Scalar largest_number(int i) {
+  return i < 2 ? Scalar(1e9) : Scalar(1e6);
+}
+
+/// What a start says of a belief of n states: kOverflow where a number or a sigma is beyond
+/// largest_number(), or a variance so small that sums of products or its inverse would not be
+/// finite in single precision; kFarFromOrigin where the format is coarse at its position
 /// (math/resolution.hpp).
 template <class Scalar>
 AUVEST_COLD Status check_numbers(const Scalar* x, const Scalar* P, int n) {
   for (int i = 0; i < n; ++i) {
     const Scalar variance = P[i * (n + 1)];
+    const Scalar largest = largest_number<Scalar>(i);
     if (i < 2 && math::is_coarse(x[i], variance)) return Status::kFarFromOrigin;
     const bool inverts = variance == Scalar(0) || variance >= Scalar(1e-30);
-    if (!inverts || !(variance <= Scalar(1e18) && math::absolute(x[i]) <= Scalar(1e9))) {
+    if (!inverts || !(variance <= largest * largest && math::absolute(x[i]) <= largest)) {
       return Status::kOverflow;
     }
   }
   return Status::kOk;
 }
+
 template <class Scalar, int N>
 Status check_numbers(const Belief<Scalar, N>& belief) {
   return check_numbers(belief.x.data(), belief.P.data(), N);
+}
+
+/// Whether a particle's belief of N states, whose first field is `from`, has a covariance, and
+/// numbers such as come about.
+template <int N, class Scalar>
+bool is_belief(const Scalar* from) {
+  Belief<Scalar, N> belief;
+  load_belief<OneLane<Scalar>>(from, belief);
+  bool sound = check_slave(belief) == Status::kOk;
+  for (int i = 2; i < N; ++i) {
+    sound = sound && math::absolute(belief.x(i)) <= largest_number<Scalar>(i);
+  }
+  return sound;
 }
 
 /// A belief of the slave that a filter may start from: as check_slave, and its numbers.

@@ -302,6 +302,19 @@ class Slatf : public SlatfFrame<
     MonteCarloError<Scalar, kPose, Safeguards_::kActive>::visit_state(self.error_, visit);
   }
 
+  /// Whether each particle has covariances, and probabilities of an Imm, which the mean over all
+  /// does not show: to ask of a state that was put back.
+  bool is_sound() const {
+    bool sound = true;
+    for (int i = 0; i < set_.size(); ++i) {
+      sound = sound && (!Proposal::kInformed || is_belief<kPose>(set_.at(i, kPoseField)));
+      for (int n = 0; n < masters_; ++n) {
+        sound = sound && Particle::Bank::is_sound(set_.at(i, Particle::master_field(n)));
+      }
+    }
+    return sound;
+  }
+
   /// With an Imm as Master: the probability that its model k moves master n.
   Scalar mode_probability(int n, int k) const {
     Scalar mean[1];

@@ -211,6 +211,15 @@ class SlatfJoint : public SlatfJointFrame<Motion_, Masters, Resampling_, Safegua
     return joint;
   }
 
+  /// Whether each particle has a covariance, which the mean over all does not show: to ask of a
+  /// state that was put back.
+  bool is_sound() const {
+    for (int i = 0; i < set_.size(); ++i) {
+      if (check_slave(particle(i)) != Status::kOk) return false;
+    }
+    return true;
+  }
+
  private:
   using Lanes = OneLane<Scalar>;
   using Frame::masters_;

@@ -257,6 +257,10 @@ class SlatfShared : public SlatfSharedFrame<Motion_, Masters, Resampling_, Safeg
     visit(self.centre_);
   }
 
+  /// Whether the covariance of all particles is one, which its sum with their spread does not show:
+  /// to ask of a state that was put back.
+  bool is_sound() const { return check_slave(centre_) == Status::kOk; }
+
  private:
   using Value = typename Lanes::Value;
   using Frame::masters_;
