@@ -46,9 +46,10 @@ def build_sketch(library, tmp_path_factory):
         if not isinstance(folder, Path):
             folder = tmp_path_factory.mktemp("sketch")
             (folder / f"{folder.name}.ino").write_text(folder_or_source)
-        # What was compiled with other macros is kept: a test may compare the two.
+        # What was compiled with other macros or for another board is kept: a test may compare them.
         define = define or {}
-        output = outputs / "_".join(["plain", *(f"{k}={v}" for k, v in sorted(define.items()))])
+        board = options.get("board", sketch.MEGA2560).split(":")[2]
+        output = outputs / "_".join([board, *(f"{k}={v}" for k, v in sorted(define.items()))])
         return sketch.compile_sketch(folder, library, output, define=define, **options)
 
     return build_sketch

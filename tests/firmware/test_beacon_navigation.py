@@ -7,7 +7,6 @@ computed must follow from it.
 import json
 import math
 import re
-import shutil
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -40,14 +39,11 @@ class Run:
 
 
 @pytest.fixture(scope="module")
-def programs(build_sketch, root, tmp_path_factory):
+def programs(build_sketch, root):
     """The sketch for the chips that have room for it."""
-    folder = tmp_path_factory.mktemp("programs")
-    programs = {}
-    for mcu, board in (("atmega2560", sketch.MEGA2560), ("atmega328p", sketch.UNO)):
-        compiled = build_sketch(root / "firmware/library/examples/beacon_navigation", board=board)
-        programs[mcu] = shutil.copy(compiled.elf, folder / f"{mcu}.elf")
-    return programs
+    folder = root / "firmware/library/examples/beacon_navigation"
+    boards = {"atmega2560": sketch.MEGA2560, "atmega328p": sketch.UNO}
+    return {mcu: build_sketch(folder, board=board).elf for mcu, board in boards.items()}
 
 
 def motion_of(sample, speed, heading):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from auvest import ConstantAcceleration, RangeBearing, Ukf
-from auvest.firmware.sketch import SketchError
+from auvest.firmware.sketch import UNO, SketchError
 from auvest.simulation import paper_aukf
 from auvest.simulation.tracking import Scenario, simulate
 from firmware import replay_record
@@ -80,6 +80,16 @@ def test_first_steps(compiled, text):
     filter_.update(np.float32([3.6, 0.65]))
     lines, _ = text(compiled("first_steps").elf, 0.1)
     assert lines == ["ok", f"x = {filter_.x[0]:.3f} m, y = {filter_.x[1]:.3f} m"]
+
+
+def test_first_steps_on_an_uno(compiled, build_sketch, root, text, board):
+    there, _ = text(compiled("first_steps").elf, 0.1)
+    elf = build_sketch(root / EXAMPLES / "first_steps", board=UNO).elf
+    with board(elf, mcu="atmega328p", for_s=0.1) as running:
+        here = [event.text for event in running if hasattr(event, "text")]
+    assert here == there
+    print(f"UNO: stack {running.report.stack_bytes} B, never used {running.report.free_bytes} B")
+    assert running.report.free_bytes >= 100
 
 
 def test_replay(compiled, text):
