@@ -151,17 +151,26 @@ BENCHES = {"host": _on_host, "atmega2560": _on_board}
 
 
 @contextmanager
+def served(first: str, answer: Answer, noise: Noise) -> Iterator[Line]:
+    """Give a bench a serial port."""
+    line = Line(first, answer, noise)
+    thread = threading.Thread(target=line.serve, daemon=True)
+    thread.start()
+    try:
+        yield line
+    finally:
+        line.close()
+        thread.join(timeout=10)
+
+
+@contextmanager
 def behind_a_port(where: str, program: Bench, folder: Path, noise: Noise) -> Iterator[Line]:
     """Build a bench for this computer or the simulated MEGA2560, and give it a serial port."""
-    with BENCHES[where](program, folder) as (first, answer):
-        line = Line(first, answer, noise)
-        thread = threading.Thread(target=line.serve, daemon=True)
-        thread.start()
-        try:
-            yield line
-        finally:
-            line.close()
-            thread.join(timeout=10)
+    with (
+        BENCHES[where](program, folder) as (first, answer),
+        served(first, answer, noise) as line,
+    ):
+        yield line
 
 
 def main() -> int:

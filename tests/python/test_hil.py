@@ -27,7 +27,7 @@ from auvest.firmware.cost import registered
 from auvest.firmware.hil_bench import ANEW, Bench, answer_of, bench, row_frame
 from auvest.firmware.hil_record import Record, on_desk, place_names, record_of
 from auvest.logs import LogFolder
-from firmware.hil_line import Noise, behind_a_port
+from firmware.hil_line import BENCHES, Noise, served
 
 CONFIG = """[start]
 sigma_position_m = 0.5
@@ -247,13 +247,29 @@ def test_fused_multiply_add_is_named_at_its_first_row(log: Path, tmp_path: Path)
 
 
 def test_rows_come_through_a_line_that_damages_loses_and_doubles(
-    log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    record: Record, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(hil_serial, "PATIENCE_S", 0.3)
-    record = record_of(LogFolder(log), SETTINGS)
-    noise = Noise(0.2, seed=3)
-    with behind_a_port("host", bench(record), tmp_path, noise) as line:
-        leg = hil.run(record, f"serial:{line.port}", tmp_path)
+    program, noise = bench(record), Noise(0.2, seed=3)
+    with BENCHES["host"](program, tmp_path) as (first, answer):
+        assert answer_of(first) == ("B", [program.digest, 0])
+        start, row, later = program.rows[:3]
+        # No other digit, letter or end of a row is taken, nor a row that is not the next.
+        for k, old in enumerate(start):
+            new = "$" if old == "R" else "0" if old != "0" else "1"
+            assert answer_of(answer(start[:k] + new + start[k + 1 :])) == ("N", [0])
+        for wrong in (row, row_frame(0, 1), start[:-9], f"{start}0", row_frame(*range(60))):
+            assert answer_of(answer(wrong)) == ("N", [0])
+        once = answer(f"half a line{start}\r")
+        assert answer_of(once)[0] == "A"
+        assert answer(start) == once
+        assert answer_of(answer(later)) == ("N", [1])
+        taken = answer(row)
+        assert answer_of(taken)[1][0] == 1
+        assert answer(row) == taken
+        assert answer_of(answer(start)) == ("N", [2])
+        with served(answer(row_frame(ANEW)), answer, noise) as line:
+            leg = hil.run(record, f"serial:{line.port}", tmp_path)
     assert leg.difference is None
     assert noise.damaged > 15
     assert leg.figures["repeated_rows"] > 5

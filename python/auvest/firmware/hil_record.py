@@ -64,6 +64,9 @@ class Record:
         filter_ = self.filter
         if filter_.dtype != np.float32:
             raise ValueError(f"the filter must be in float32, not in {filter_.dtype}")
+        columns = (self.sensor, self.dt, self.z, self.input, self.place)
+        if len({len(column) for column in columns}) != 1:
+            raise ValueError("sensor, dt, z, input and place must have the same number of rows")
         if filter_.components > 1:
             raise ValueError("[filter] components must be 1: a bench has one Gaussian")
         if filter_.late_s > 0:
