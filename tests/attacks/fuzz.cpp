@@ -243,7 +243,7 @@ bool same(const std::vector<Scalar>& a, const std::vector<Scalar>& b) {
 bool same(const desk::FilterState<Scalar>& a, const desk::FilterState<Scalar>& b) {
   return same(a.x, b.x) && same(a.P, b.P) && same(a.input, b.input) && same(a.policy, b.policy) &&
          same(a.recovery, b.recovery) && same(a.base, b.base) && same(a.events, b.events) &&
-         a.sensors == b.sensors;
+         same(a.mixture, b.mixture) && a.sensors == b.sensors;
 }
 
 /// A filter and what it is made of.
@@ -276,14 +276,15 @@ class Gaussian {
     if (bytes.below(2)) rule.residual = Residual::kPostFit;
     options_.rule = typename Options::Rule(kernel(bytes), recovery, rule);
     options_.policy = policy(bytes);
+    if (process_->states > 1 && bytes.below(4) == 0) options_.components = 8;
     options_.late_s = bytes.below(3) == 0 ? bytes.positive(5) : Scalar(0);
     if (!(options_.late_s >= Scalar(0)) || !std::isfinite(options_.late_s)) return;
     if (options_.rule.check() != Status::kOk) return;
     static const char* const kinds[] = {"EKF", "UKF", "CKF"};
     name_ = kinds[int(options_.kind)] + std::string(" of ") + entry->first;
     filter_ = make();
-    say("%s, late %g, policy %d", name_.c_str(), double(options_.late_s),
-        int(options_.policy.kind));
+    say("%s, late %g, policy %d, components %d", name_.c_str(), double(options_.late_s),
+        int(options_.policy.kind), options_.components);
   }
 
   std::unique_ptr<Filter> make() const {

@@ -119,6 +119,8 @@ class Calls:
             "residual": lambda: repr(rng.choice(("innovation", "post-fit"))),
             "max_iterations": lambda: str(rng.randrange(1, 12)),
             "tolerance": lambda: v.positive(0.1),
+            "components": lambda: rng.choice(("1", "8", "16", v.number(20))),
+            "headings": lambda: rng.choice(("1", "1", "2", v.number(3))),
             "dtype": v.dtype,
         }
         if "Ukf" in entry.cls or "ukf" in entry.cls:

@@ -81,6 +81,16 @@ def subjects() -> dict[str, Any]:
                 found[f"{kind.__name__} of {name}, {dtype}"] = kind(
                     *start(process), dtype=dtype, **options
                 )
+            process = BUILT_IN["SpeedHeading"]
+            found[f"{kind.__name__} of an unknown start, {dtype}"] = kind(
+                *start(process),
+                process=process,
+                sensors=sensors_for(process),
+                kernel="igg",
+                recovery=auvest.RejectionStreak(),
+                components=8,
+                dtype=dtype,
+            )
             process = BUILT_IN["SpeedHeadingBias"]
             for policy, chosen in _POLICIES.items():
                 late = kind(
