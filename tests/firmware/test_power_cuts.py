@@ -291,8 +291,8 @@ def test_what_is_too_old_is_not_resumed(often, board, tmp_path):
     assert lines["BOOT"] == [["1", "1"]]
     assert power_cuts.number(lines["RESUME"][0][4]) > power_cuts.setting("kOldest")
     assert lines["CRAFT"][0][1] == "0.500000"
-    P00 = power_cuts.number(lines["CRAFT"][0][8])
-    assert P00 < power_cuts.setting("kSigmaStart") ** 2
+    variance = power_cuts.number(lines["CRAFT"][0][8])
+    assert variance < power_cuts.setting("kSigmaStart") ** 2
 
 
 def test_keeping_costs_little(often, build_sketch, runner, tmp_path):
