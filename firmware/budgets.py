@@ -42,6 +42,7 @@ from auvest.simulation.vehicle_in_the_loop import (
 from firmware.parity.slatf import fields_of, paper_world
 from firmware.parity.targets import AVR_PARTICLES
 from firmware.parity.vehicle import MissionRecord, zigzag
+from firmware.power_cuts import Craft
 
 ROOT = Path(__file__).resolve().parents[1]
 BUDGETS = ROOT / "firmware" / "budgets.csv"
@@ -366,6 +367,7 @@ def measure(output: Path) -> list[Row]:
     programs["slave_tracking"] = _run_slave_tracking
     programs["beacon_navigation"] = _run_beacon_navigation
     programs["mission"] = _run_mission
+    programs["power_cuts"] = _run_power_cuts
     compiled = {}
     for program in programs:  # one after the other: they share Arduino's core
         folder = output / "sketches" / program
@@ -507,6 +509,28 @@ def _run_beacon_navigation(compiled: Compiled, folder: Path) -> Row:
     return _row(folder.name, compiled, board.report.stack_bytes, cycles)
 
 
+def _run_power_cuts(compiled: Compiled, folder: Path) -> Row:
+    """Measure 125 samples, in one of which a checkpoint begins: the cycles awake in each."""
+    reader = telemetry.Reader()
+    rows: list[telemetry.Row] = []
+    craft = Craft()
+    with Board(compiled.elf, limit_s=120.0) as board:
+        for event in board:
+            if not isinstance(event, SerialLine):
+                continue
+            row = reader.read(event.text)
+            if isinstance(row, dict):
+                rows.append(row)
+            if len(rows) == 126:
+                break
+            answer = craft.answer(event.text, event.time_s, clock=False)
+            if answer is not None:
+                board.send(answer, delay_s=0.01)
+    # The first sample counts the start too.
+    cycles = [round(row["awake_us"] * 16) for row in rows[1:]]
+    return _row(folder.name, compiled, board.report.stack_bytes, cycles)
+
+
 def _run_mission(compiled: Compiled, folder: Path) -> Row:
     """Measure 60 s of a vehicle in the loop: the cycles awake per sample, telemetry's share too."""
     chip = ChipFlight(Vehicle(chip_mission()))
@@ -610,7 +634,8 @@ def page(rows: list[Row]) -> str:
         "its whole run, serial text included; `replay` counts predict, update and feedback by the",
         "chip's timer; `tracking_loop` counts the cycles awake between two samples,",
         "`slave_tracking` those between two pings, `beacon_navigation` those of a sample with a",
-        "range that is 3 s old, serial text included, and `mission` those per",
+        "range that is 3 s old, serial text included, `power_cuts` those per",
+        "sample of 0.5 s, a checkpoint in one of 120 included, and `mission` those per",
         "sample of 0.1 s. Its pilot by itself, in 100 s of the same mission: `pilot_steer` is",
         "guidance and control, `pilot_predict` heading and estimate, each twice because of late",
         "fixes, `pilot_update` one fix.",

@@ -278,6 +278,23 @@ def test_age_without_and_with_a_clock(often, board, tmp_path):
     assert with_clock == [0, 1]
 
 
+def test_what_is_too_old_is_not_resumed(often, board, tmp_path):
+    """Here the count of starts is lost, and with it all that is known of the age."""
+    memory = tmp_path / "eeprom"
+    for _ in range(2):
+        start(board, often, memory, 2.0)
+    content = memory.read_bytes()
+    lines = start(board, often, memory, 1.0)
+    assert float(lines["CRAFT"][0][1]) > 30  # seconds since the first start, about
+    memory.write_bytes(content[:MEMORY] + b"\xff" * 16)
+    lines = start(board, often, memory, 1.0)
+    assert lines["BOOT"] == [["1", "1"]]
+    assert power_cuts.number(lines["RESUME"][0][4]) > power_cuts.setting("kOldest")
+    assert lines["CRAFT"][0][1] == "0.500000"
+    variance = power_cuts.number(lines["CRAFT"][0][8])
+    assert variance < power_cuts.setting("kSigmaStart") ** 2
+
+
 def test_keeping_costs_little(often, build_sketch, runner, tmp_path):
     never = build_sketch(power_cuts.edited(tmp_path, power_cuts.NEVER)).elf
     cost = power_cuts.measure(often, never, power_cuts.OFTEN_S, runner)

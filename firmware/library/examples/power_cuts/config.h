@@ -23,6 +23,9 @@ constexpr float kCheckpointPeriod = 60;
 /// may do in that time. Where nothing bounds it, a checkpoint is worth nothing: start anew.
 constexpr float kLongestOff = 60;
 
+/// What may be older than this is not worth resuming [s].
+constexpr float kOldest = 3600;
+
 /// The beacons, and how well a range to one is known [m].
 constexpr float kBeacons[3][2] = {{0, 0}, {80, 0}, {40, 70}};
 constexpr float kSigmaRange = 0.5f;

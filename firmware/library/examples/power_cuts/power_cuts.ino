@@ -1,11 +1,10 @@
 // A craft between three beacons, whose estimate outlives a cut of its power: RobustEkf (Li, Du,
 // Fan, Chen, Mao, Luo 2020) on an Arduino MEGA2560, with checkpoints in the EEPROM and a watchdog.
 //
-//     chip to clock     $CLOCK,1*...                  once, at the start
-//     clock to chip     $CLOCK,1,20,43200*...         days and seconds; no answer: there is no
-//     clock chip to sonar     $PING,17*...                  every half second, to one beacon after
-//     the other sonar to chip     $RANGE,17,41.25,2*...         sample, range [m], to which beacon
-//     (0, 1 or 2)
+//     chip to clock     $CLOCK,1*...              once, at the start
+//     clock to chip     $CLOCK,1,20,43200*...     days and seconds; no answer: no clock
+//     chip to sonar     $PING,17*...              every half second, one beacon after the other
+//     sonar to chip     $RANGE,17,41.25,2*...     sample, range [m], beacon (0, 1 or 2)
 //
 // Behind * stand the eight digits of the line's CRC-32 (auvest/board/line.hpp).
 //
@@ -65,7 +64,7 @@ void note(auvest::Status status) {
 }
 
 // Nothing is known from before.
-AUVEST_OUTLINE auvest::Status start_filter() {
+AUVEST_OUTLINE void start_filter() {
   Filter::State x;
   Filter::Covariance P;
   auvest::math::set_zero(x);
@@ -75,7 +74,7 @@ AUVEST_OUTLINE auvest::Status start_filter() {
     P(i, i) = kSigmaStart * kSigmaStart;
     P(i + 2, i + 2) = kSigmaVelocity * kSigmaVelocity;
   }
-  return filter.reset(x, P);
+  filter.reset(x, P);
 }
 
 // Asks for the time, days and seconds of the day. False: there is no clock.
@@ -108,13 +107,13 @@ AUVEST_OUTLINE void resume() {
   Age age = {0, 0};
   if (resumed.sequence != 0) age = age_of(resumed.time, seconds);
   Telemetry::resumed(resumed, checkpoints.sum(), age, filter);
-  auvest::Status status = auvest::Status::kNotInitialised;
-  if (resumed.sequence != 0) {
-    status = auvest::predict_within(filter, age.least, age.most);
+  if (resumed.sequence != 0 && age.most <= kOldest &&
+      auvest::predict_within(filter, age.least, age.most) == auvest::Status::kOk) {
     sample.time.seconds =
         resumed.time.seconds + static_cast<uint32_t>(0.5f * (age.least + age.most));
+  } else {
+    start_filter();
   }
-  if (status != auvest::Status::kOk) note(start_filter());
   if (clock) sample.time.seconds = seconds;
 }
 
