@@ -79,6 +79,7 @@ def test_a_build_without_xsimd_says_so() -> None:
             ["Examples", "--interval covariance-budget", "--noise-bias", "--tau0", "figure3"],
         ),
         (["reproduce", "aukf", "--help"], ["Examples", "--json", "README.md"]),
+        (["hil", "--help"], ["Examples", "--target serial:/dev/ttyACM0", "pyserial", "cortex-m4f"]),
     ],
 )
 def test_help_teaches(arguments: list[str], words: list[str]) -> None:

@@ -7,9 +7,9 @@ filter in float32. The first number that differs is named; exit code 1 then.
 
 Targets: host is this computer (needs g++ and Eigen), atmega2560 a simulated MEGA2560 (avr-gcc,
 arduino-builder, Arduino's core, simavr), cortex-m3 and cortex-m4f are boards of QEMU, serial:PORT
-is a board of yours (pip install 'auvest[serial]'). What is missing is named. For a board of yours
-load the sketch 'bench' of the output folder first; that it is the right one is checked, and what
-the line damages or loses is sent again.
+is a board of yours (pyserial). What is missing is named. For a board of yours load the sketch
+'bench' of the output folder first; that it is the right one is checked, and what the line damages
+or loses is sent again.
 
 The output folder gets the bits of each target as Parquet, the sketch, a report and results.json.
 
