@@ -311,7 +311,7 @@ def test_a_range_that_sound_cannot_reach_is_refused_by_the_filter(play, loops, o
 
 
 def test_what_cannot_be_is_implausible_and_not_taken(play, loops, on_the_desk):
-    """A jump, a bearing that is none, two beyond the gate: named, counted, predicted only."""
+    """A jump, a bearing that is none, two beyond the gate: named, predicted only."""
     sound = noisy_sonar()
     wrong = {20: (15.0, 0.0), 24: (0.0, 7.0), 28: (1.5, 0.0), 32: (0.0, 0.5)}
 
@@ -325,8 +325,6 @@ def test_what_cannot_be_is_implausible_and_not_taken(play, loops, on_the_desk):
     assert_same_bits(run, on_the_desk(run, POLICIES["law"][0]))
     implausible = run.column("status") == IMPLAUSIBLE
     assert [k + 1 for k in np.flatnonzero(implausible)] == list(wrong)
-    assert np.diff(run.column("implausible"), prepend=0)[implausible].tolist() == [1, 1, 1, 1]
-    assert run.rows[-1]["implausible"] == len(wrong)
     nis = run.column("nis")[implausible]
     assert np.isnan(nis[:2]).all(), "the limits come first"
     assert (nis[2:] > 13.8).all(), "the gate says by how much"

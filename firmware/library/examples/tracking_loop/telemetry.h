@@ -24,7 +24,6 @@ struct Sample {
   auvest::Status status = auvest::Status::kOk;  ///< the first that is not kOk
   uint32_t missed = 0;                          ///< samples without a measurement
   uint32_t refused = 0;                         ///< lines received that were of no use
-  uint32_t implausible = 0;                     ///< measurements beyond limits or gate
   uint32_t late = 0;                            ///< samples taken after their deadline
   uint32_t awake = 0;                           ///< ticks since the line before
 };
@@ -55,7 +54,7 @@ class Telemetry {
         if (per_seconds > 1) line.print(per_seconds);
       }
     }
-    line.print(F(",nis,interval_s,status#,missed#,refused#,implausible#,late#,awake_us#"));
+    line.print(F(",nis,interval_s,status#,missed#,refused#,late#,awake_us#"));
     line.finish();
     Serial.flush();
   }
@@ -83,7 +82,6 @@ class Telemetry {
     line_.field(static_cast<uint32_t>(sample.status));
     line_.field(sample.missed);
     line_.field(sample.refused);
-    line_.field(sample.implausible);
     line_.field(sample.late);
     line_.field(sample.awake * auvest_board::kMicrosecondsPerTick);
     line_.finish();

@@ -14,7 +14,7 @@
 //
 // Impossible measurements. A range that sound cannot have come back from has the status
 // kImpossibleRange; one that changes faster than the vehicle moves, a bearing beyond a turn, or
-// both beyond the gate of the filter, kImplausible. All are counted as implausible, and predicted
+// both beyond the gate of the filter, kImplausible. All are predicted
 // only.
 //
 // Text, 115200 baud. Each sample gives one line, $AUV,...*hhhhhhhh; a line at the start names its
@@ -112,7 +112,6 @@ void update() {
       filter.widen(correction.nis);
     }
   }
-  if (status != auvest::Status::kOk) ++sample.implausible;
   note(status);
 }
 
