@@ -128,7 +128,8 @@ def test_the_runner_is_told_what_to_run(tmp_path: Path) -> None:
     arguments = json.loads(bench.told[0])
     assert arguments == [
         "--interactive", "--mcu", "atmega328p", "--frequency", "16000000", "--limit", "2.5",
-        "--watch", "PORTB7", "--watch", "all", "--", str(bench.elf),
+        "--watch", "PORTB7", "--watch", "all", "--reset-cause", "power-on", "--seed", "1",
+        "--", str(bench.elf),
     ]  # fmt: skip
     with bench.board(for_s=0.5, limit_s=9.0, input=tmp_path / "in", output=tmp_path / "out"):
         pass
@@ -137,6 +138,11 @@ def test_the_runner_is_told_what_to_run(tmp_path: Path) -> None:
         "--for", "0.5", "--input", str(tmp_path / "in"), "--output", str(tmp_path / "out"),
     ]  # fmt: skip
     assert bench.told[1:] == ["stop"]  # leaving the block ends a run that is not over
+    with bench.board(eeprom=tmp_path / "kept", reset_cause="watchdog", cut_cycle=7, seed=3):
+        pass
+    assert json.loads(bench.told[0])[7:-2] == [
+        "--eeprom", str(tmp_path / "kept"), "--reset-cause", "watchdog", "--seed", "3", "--cut", "7",
+    ]  # fmt: skip
 
 
 def test_a_failure_is_an_error_with_its_report(tmp_path: Path) -> None:

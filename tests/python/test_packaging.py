@@ -45,11 +45,14 @@ def test_wheel_contents(wheel):
     package = [name for name in names if ".dist-info/" not in name]
     assert {"auvest/__init__.py", "auvest/_core.pyi", "auvest/py.typed"} <= set(package)
     assert [name for name in package if re.fullmatch(r"auvest/_core\..*\.so", name)]
-    # No tests, no caches; C++ only where it is compiled from: the headers, library and board.
+    # No tests, no caches; C++ only where it is compiled from: the headers, library, board and bench.
     assert not [name for name in package if not name.startswith("auvest/")]
     assert not [name for name in package if re.search(r"\btests?\b|__pycache__", name)]
     sources = {name.rpartition("/")[0] for name in package if re.search(r"\.([ch]pp|S|ino)$", name)}
-    brought = ("include", "firmware/library", "firmware/avr_std", "firmware/board")
+    brought = (
+        "include",
+        *(f"firmware/{part}" for part in ("library", "avr_std", "board", "bench")),
+    )
     assert all(folder.startswith(tuple(f"auvest/{part}" for part in brought)) for folder in sources)
     headers = [name.split("/")[2] for name in package if name.startswith("auvest/include/")]
     assert set(headers) == {"Eigen", "auvest", "desk"}
