@@ -141,7 +141,8 @@ def test_the_runner_is_told_what_to_run(tmp_path: Path) -> None:
     with bench.board(eeprom=tmp_path / "kept", reset_cause="watchdog", cut_cycle=7, seed=3):
         pass
     assert json.loads(bench.told[0])[7:-2] == [
-        "--eeprom", str(tmp_path / "kept"), "--reset-cause", "watchdog", "--seed", "3", "--cut", "7",
+        "--eeprom", str(tmp_path / "kept"), "--reset-cause", "watchdog",
+        "--seed", "3", "--cut", "7",
     ]  # fmt: skip
 
 

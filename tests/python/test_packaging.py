@@ -45,7 +45,7 @@ def test_wheel_contents(wheel):
     package = [name for name in names if ".dist-info/" not in name]
     assert {"auvest/__init__.py", "auvest/_core.pyi", "auvest/py.typed"} <= set(package)
     assert [name for name in package if re.fullmatch(r"auvest/_core\..*\.so", name)]
-    # No tests, no caches; C++ only where it is compiled from: the headers, library, board and bench.
+    # No tests, no caches; C++ only where it is compiled from: headers, library, board, bench.
     assert not [name for name in package if not name.startswith("auvest/")]
     assert not [name for name in package if re.search(r"\btests?\b|__pycache__", name)]
     sources = {name.rpartition("/")[0] for name in package if re.search(r"\.([ch]pp|S|ino)$", name)}
