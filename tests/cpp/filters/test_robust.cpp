@@ -475,8 +475,8 @@ TEST_CASE("robust update: what was saved goes on with the same bits, whatever th
 /// number.
 template <class Filter>
 void check_short_forms(Filter whole) {
-  using Process = typename Filter::Process;
-  Filter from_process{Process()};
+  using Motion = typename Filter::Process;
+  Filter from_process{Motion()};
   Filter from_nothing;
   const auvest::LeaderRange<float, 2> beacon;
   Filter* const filters[] = {&whole, &from_process, &from_nothing};
@@ -494,17 +494,17 @@ void check_short_forms(Filter whole) {
 }
 
 TEST_CASE("filters: from a process alone, and from nothing") {
-  using Process = auvest::SpeedHeading<float>;
-  using Inside = auvest::Ekf<Process>;
+  using Motion = auvest::SpeedHeading<float>;
+  using Inside = auvest::Ekf<Motion>;
   using Rule = auvest::RobustUpdate<auvest::Igg<float>, auvest::RejectionStreak<float>>;
   using Policy = auvest::MahalanobisInterval<float>;
-  check_short_forms(Inside(Process()));
-  check_short_forms(auvest::Ckf<Process>(Process()));
-  check_short_forms(auvest::Ukf<Process>(Process(), auvest::Ukf<Process>::default_params()));
-  check_short_forms(auvest::RobustEkf<Process>(Inside(Process()), Rule()));
-  check_short_forms(auvest::Aukf<Process>(auvest::Ukf<Process>(Process()), Policy()));
-  check_short_forms(auvest::GaussianSum<auvest::RobustEkf<Process>>(
-      auvest::RobustEkf<Process>(Inside(Process()), Rule())));
+  check_short_forms(Inside(Motion()));
+  check_short_forms(auvest::Ckf<Motion>(Motion()));
+  check_short_forms(auvest::Ukf<Motion>(Motion(), auvest::Ukf<Motion>::default_params()));
+  check_short_forms(auvest::RobustEkf<Motion>(Inside(Motion()), Rule()));
+  check_short_forms(auvest::Aukf<Motion>(auvest::Ukf<Motion>(Motion()), Policy()));
+  check_short_forms(auvest::GaussianSum<auvest::RobustEkf<Motion>>(
+      auvest::RobustEkf<Motion>(Inside(Motion()), Rule())));
 }
 
 }  // namespace
