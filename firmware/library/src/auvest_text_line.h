@@ -87,7 +87,7 @@ class LineOut : public Print {
 
 /// A line that is written first and sent when there is time.
 template <size_t Capacity>
-class StoredLine final : public LineOut {
+class StoredLine : public LineOut {
  public:
   StoredLine() {
     text_ = characters_;
@@ -123,5 +123,35 @@ class StoredLine final : public LineOut {
   char characters_[Capacity];
   size_t sent_ = 0;
 };
+
+/// The line of a sample, whose numbers keep all their bits or, to be read by eye, have so many
+/// decimals.
+template <size_t Capacity, bool Exact, int Decimals>
+class SampleLine final : public StoredLine<Capacity> {
+ public:
+  void number(float value) {
+    if (Exact) {
+      this->field(value);
+    } else {
+      this->empty_field();
+      this->print(value, Decimals);
+    }
+  }
+
+  void optional(bool present, float value) {
+    if (present) {
+      number(value);
+    } else {
+      this->empty_field();
+    }
+  }
+};
+
+/// Says how much RAM neither heap nor stack has touched: ram_unused() of auvest_board.h.
+inline void remark_ram(size_t unused) {
+  Serial.print(F("# bytes of RAM never used: "));
+  Serial.print(unused);
+  Serial.print(F("\r\n"));
+}
 
 }  // namespace auvest_board

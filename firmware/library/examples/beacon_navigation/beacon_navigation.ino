@@ -126,7 +126,7 @@ AUVEST_OUTLINE void report() {
   telemetry.write(sample, late.filter());
   if (sample.number % 60 == 0 && !wake_timer::reached(deadline - kPause)) {
     telemetry.line().send();
-    Telemetry::remark_ram(auvest_board::ram_unused());
+    auvest_board::remark_ram(auvest_board::ram_unused());
   }
 }
 

@@ -40,7 +40,7 @@ class Telemetry {
   static constexpr size_t kCapacity = 96 + kNumbers * (kExactText ? 9 : 10);
 
  public:
-  using Line = auvest_board::StoredLine<kCapacity>;
+  using Line = auvest_board::SampleLine<kCapacity, kExactText, 3>;
 
   /// Names the columns, those of whole numbers with #; to be sent once, before the first line.
   static void introduce() {
@@ -54,32 +54,26 @@ class Telemetry {
     Serial.flush();
   }
 
-  static void remark_ram(size_t unused) {
-    Serial.print(F("# bytes of RAM never used: "));
-    Serial.print(unused);
-    Serial.print(F("\r\n"));
-  }
-
   void write(const Sample& sample, const Filter& filter) {
     line_.start("NAV");
     line_.field(sample.number);
     line_.field(sample.time);
-    number(sample.dt);
-    optional(sample.read, sample.u(0));
-    optional(sample.read, sample.u(2));
+    line_.number(sample.dt);
+    line_.optional(sample.read, sample.u(0));
+    line_.optional(sample.read, sample.u(2));
     if (sample.heard) {
       line_.field(sample.beacon);
     } else {
       line_.empty_field();
     }
-    optional(sample.heard, sample.range_m);
-    optional(sample.heard, sample.age);
-    for (int i = 0; i < 2; ++i) number(filter.x()(i));
+    line_.optional(sample.heard, sample.range_m);
+    line_.optional(sample.heard, sample.age);
+    for (int i = 0; i < 2; ++i) line_.number(filter.x()(i));
     for (int i = 0; i < 2; ++i) {
-      for (int j = 0; j <= i; ++j) number(filter.belief().P(i, j));
+      for (int j = 0; j <= i; ++j) line_.number(filter.belief().P(i, j));
     }
-    optional(sample.corrected, sample.nis);
-    optional(sample.corrected, sample.weight);
+    line_.optional(sample.corrected, sample.nis);
+    line_.optional(sample.corrected, sample.weight);
     line_.field(static_cast<uint32_t>(sample.status));
     line_.field(sample.missed);
     line_.field(sample.refused);
@@ -93,22 +87,5 @@ class Telemetry {
   Line& line() { return line_; }
 
  private:
-  void number(float value) {
-    if (kExactText) {
-      line_.field(value);
-    } else {
-      line_.empty_field();
-      line_.print(value, 3);
-    }
-  }
-
-  void optional(bool present, float value) {
-    if (present) {
-      number(value);
-    } else {
-      line_.empty_field();
-    }
-  }
-
   Line line_;
 };

@@ -108,7 +108,7 @@ AUVEST_OUTLINE void report() {
   telemetry.write(sample, pilot);
   if (sample.number % (120 * kSamplesPerLine) == 0 && !wake_timer::reached(deadline - kPause)) {
     telemetry.line().send();
-    Telemetry::remark_ram(auvest_board::ram_unused());
+    auvest_board::remark_ram(auvest_board::ram_unused());
   }
 }
 

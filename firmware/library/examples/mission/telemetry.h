@@ -42,12 +42,6 @@ class Telemetry {
     Serial.flush();
   }
 
-  static void remark_ram(size_t unused) {
-    Serial.print(F("# bytes of RAM never used: "));
-    Serial.print(unused);
-    Serial.print(F("\r\n"));
-  }
-
   template <class Pilot>
   void write(const Sample& sample, const Pilot& pilot) {
     line_.start("MISSION");

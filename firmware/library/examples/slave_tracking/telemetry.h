@@ -35,7 +35,7 @@ class Telemetry {
   static constexpr size_t kCapacity = 88 + kNumbers * (kExactText ? 9 : 10);
 
  public:
-  using Line = auvest_board::StoredLine<kCapacity>;
+  using Line = auvest_board::SampleLine<kCapacity, kExactText, 3>;
 
   /// Names the columns, those of whole numbers with #; to be sent once, before the first line.
   static void introduce() {
@@ -51,27 +51,21 @@ class Telemetry {
     Serial.flush();
   }
 
-  static void remark_ram(size_t unused) {
-    Serial.print(F("# bytes of RAM never used: "));
-    Serial.print(unused);
-    Serial.print(F("\r\n"));
-  }
-
   /// The estimates only after a ping: they take a tenth of a second.
   void write(const Sample& sample, const Filter& filter) {
     line_.start("SLAVE");
     line_.field(sample.number);
     line_.field(sample.time);
-    number(sample.dt);
-    for (int i = 0; i < 2; ++i) optional(sample.read, sample.u(i));
-    for (int i = 0; i < 2; ++i) optional(sample.heard, sample.z(i));
+    line_.number(sample.dt);
+    for (int i = 0; i < 2; ++i) line_.optional(sample.read, sample.u(i));
+    for (int i = 0; i < 2; ++i) line_.optional(sample.heard, sample.z(i));
     if (sample.pinged) {
       write_slave(filter.slave());
       write_master(filter.master(0));
     } else {
       for (int i = 0; i < 12; ++i) line_.empty_field();
     }
-    optional(sample.heard, filter.effective_size());
+    line_.optional(sample.heard, filter.effective_size());
     line_.field(static_cast<uint32_t>(filter.resamplings()));
     line_.field(static_cast<uint32_t>(sample.status));
     line_.field(sample.missed);
@@ -86,37 +80,20 @@ class Telemetry {
 
  private:
   void write_slave(const Filter::SlaveBelief& slave) {
-    for (int i = 0; i < 2; ++i) number(slave.x(i));
+    for (int i = 0; i < 2; ++i) line_.number(slave.x(i));
     write_position_covariance(slave.P);
   }
 
   void write_master(const Filter::MasterBelief& master) {
-    for (int i = 0; i < 4; ++i) number(master.x(i));
+    for (int i = 0; i < 4; ++i) line_.number(master.x(i));
     write_position_covariance(master.P);
   }
 
   template <class Covariance>
   void write_position_covariance(const Covariance& P) {
-    number(P(0, 0));
-    number(P(1, 0));
-    number(P(1, 1));
-  }
-
-  void number(float value) {
-    if (kExactText) {
-      line_.field(value);
-    } else {
-      line_.empty_field();
-      line_.print(value, 3);
-    }
-  }
-
-  void optional(bool present, float value) {
-    if (present) {
-      number(value);
-    } else {
-      line_.empty_field();
-    }
+    line_.number(P(0, 0));
+    line_.number(P(1, 0));
+    line_.number(P(1, 1));
   }
 
   Line line_;

@@ -34,7 +34,7 @@ class Telemetry {
   static constexpr size_t kCapacity = 88 + kNumbers * (kExactText ? 9 : 14);
 
  public:
-  using Line = auvest_board::StoredLine<kCapacity>;
+  using Line = auvest_board::SampleLine<kCapacity, kExactText, 6>;
 
   /// Names the columns, those of whole numbers with #; to be sent once, before the first line.
   static void introduce() {
@@ -59,26 +59,20 @@ class Telemetry {
     Serial.flush();
   }
 
-  static void remark_ram(size_t unused) {
-    Serial.print(F("# bytes of RAM never used: "));
-    Serial.print(unused);
-    Serial.print(F("\r\n"));
-  }
-
   template <class Filter>
   void write(const Sample& sample, const Filter& filter) {
     line_.start("AUV");
     line_.field(sample.number);
     line_.field(sample.time);
-    number(sample.dt);
-    for (int i = 0; i < 2; ++i) optional(sample.measured, sample.z(i));
-    for (int i = 0; i < 2; ++i) number(sample.desired(i));
-    for (int i = 0; i < 6; ++i) number(filter.x()(i));
+    line_.number(sample.dt);
+    for (int i = 0; i < 2; ++i) line_.optional(sample.measured, sample.z(i));
+    for (int i = 0; i < 2; ++i) line_.number(sample.desired(i));
+    for (int i = 0; i < 6; ++i) line_.number(filter.x()(i));
     for (int i = 0; i < kCovarianceRows; ++i) {
-      for (int j = 0; j <= i; ++j) number(filter.belief().P(i, j));
+      for (int j = 0; j <= i; ++j) line_.number(filter.belief().P(i, j));
     }
-    optional(sample.nis >= 0, sample.nis);
-    number(filter.interval());
+    line_.optional(sample.nis >= 0, sample.nis);
+    line_.number(filter.interval());
     line_.field(static_cast<uint32_t>(sample.status));
     line_.field(sample.missed);
     line_.field(sample.refused);
@@ -90,22 +84,5 @@ class Telemetry {
   Line& line() { return line_; }
 
  private:
-  void number(float value) {
-    if (kExactText) {
-      line_.field(value);
-    } else {
-      line_.empty_field();
-      line_.print(value, 6);
-    }
-  }
-
-  void optional(bool present, float value) {
-    if (present) {
-      number(value);
-    } else {
-      line_.empty_field();
-    }
-  }
-
   Line line_;
 };

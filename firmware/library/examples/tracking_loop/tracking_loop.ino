@@ -161,6 +161,6 @@ void loop() {
   telemetry.write(sample, filter);
   if (!wake_timer::reached(deadline - telemetry.line().duration())) telemetry.line().send();
   if (sample.number % 60 == 0 && !wake_timer::reached(deadline - kPause)) {
-    Telemetry::remark_ram(auvest_board::ram_unused());
+    auvest_board::remark_ram(auvest_board::ram_unused());
   }
 }
