@@ -15,7 +15,7 @@ import os
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -439,96 +439,86 @@ def _run_replay(compiled: Compiled, folder: Path) -> Row:
     return _row(folder.name, compiled, board.report.stack_bytes, cycles)
 
 
-def _run_tracking_loop(compiled: Compiled, folder: Path) -> Row:
-    """Measure 60 samples of a vehicle at rest: the cycles awake, by the sketch's own clock."""
+def _samples(
+    elf: Path, count: int, answers: Callable[[SerialLine], Iterable[tuple[str, float]]]
+) -> tuple[list[float], int]:
+    """Play to a sketch until it has reported so many samples: cycles awake of each, and the stack.
+
+    ``answers`` gives what a line is answered, each with its delay in s.
+    """
     reader = telemetry.Reader()
-    rows: list[telemetry.Row] = []
-    with Board(compiled.elf, limit_s=120.0) as board:
+    cycles: list[float] = []
+    with Board(elf, limit_s=120.0) as board:
         for event in board:
             if not isinstance(event, SerialLine):
                 continue
             row = reader.read(event.text)
             if isinstance(row, dict):
-                rows.append(row)
-            if len(rows) == 60:
+                cycles.append(16 * row["awake_us"])
+            if len(cycles) == count:
                 break
-            sample = telemetry.requested_sample(event.text)
-            if sample is not None:
-                board.send(telemetry.answer(sample, 5.0, 0.5), delay_s=0.01)
-    cycles = [round(row["awake_us"] * 16) for row in rows]
-    return _row(folder.name, compiled, board.report.stack_bytes, cycles)
+            for text, delay_s in answers(event):
+                board.send(text, delay_s)
+    return cycles, board.report.stack_bytes
+
+
+def _run_tracking_loop(compiled: Compiled, folder: Path) -> Row:
+    """Measure 60 samples of a vehicle at rest: the cycles awake, by the sketch's own clock."""
+
+    def answers(line: SerialLine) -> Iterator[tuple[str, float]]:
+        sample = telemetry.requested_sample(line.text)
+        if sample is not None:
+            yield telemetry.answer(sample, 5.0, 0.5), 0.01
+
+    cycles, stack = _samples(compiled.elf, 60, answers)
+    return _row(folder.name, compiled, stack, [round(count) for count in cycles])
 
 
 def _run_slave_tracking(compiled: Compiled, folder: Path) -> Row:
     """Measure 20 pings of the paper's scenario: the cycles awake between two of them."""
-    reader = telemetry.Reader()
-    awake_us: list[float] = []
     readings = paper_world().readings
-    with Board(compiled.elf, limit_s=120.0) as board:
-        for event in board:
-            if not isinstance(event, SerialLine):
-                continue
-            row = reader.read(event.text)
-            if isinstance(row, dict):
-                awake_us.append(row["awake_us"])
-            if len(awake_us) == 41:
-                break
-            sample = telemetry.requested_sample(event.text, "ODO")
-            if sample is not None:
-                speed, heading = readings["u"][sample - 1]
-                answer = telemetry.frame(f"MOTION,{sample},{speed:.6f},{heading:.6f}")
-                board.send(answer, delay_s=0.005)
-            sample = telemetry.requested_sample(event.text)
-            if sample is not None:
-                board.send(telemetry.answer(sample, *readings["z"][sample - 1]), delay_s=0.4)
+
+    def answers(line: SerialLine) -> Iterator[tuple[str, float]]:
+        sample = telemetry.requested_sample(line.text, "ODO")
+        if sample is not None:
+            speed, heading = readings["u"][sample - 1]
+            yield telemetry.frame(f"MOTION,{sample},{speed:.6f},{heading:.6f}"), 0.005
+        sample = telemetry.requested_sample(line.text)
+        if sample is not None:
+            yield telemetry.answer(sample, *readings["z"][sample - 1]), 0.4
+
+    cycles, stack = _samples(compiled.elf, 41, answers)
     # The first sample counts the start too.
-    pairs = np.array(awake_us[1:]).reshape(-1, 2).sum(axis=1)
-    return _row(folder.name, compiled, board.report.stack_bytes, [round(16 * us) for us in pairs])
+    pairs = np.array(cycles[1:]).reshape(-1, 2).sum(axis=1)
+    return _row(folder.name, compiled, stack, [round(count) for count in pairs])
 
 
 def _run_beacon_navigation(compiled: Compiled, folder: Path) -> Row:
     """Measure 40 samples of a vehicle at rest, its ranges 2.3 s late: the cycles awake of each."""
-    reader = telemetry.Reader()
-    rows: list[telemetry.Row] = []
     ranges = (14.142, 110.454, 94.340)  # of (10, 10) m from the sketch's beacons
-    with Board(compiled.elf, limit_s=60.0) as board:
-        for event in board:
-            if not isinstance(event, SerialLine):
-                continue
-            row = reader.read(event.text)
-            if isinstance(row, dict):
-                rows.append(row)
-            if len(rows) == 40:
-                break
-            sample = telemetry.requested_sample(event.text, "ODO")
-            if sample is not None:
-                board.send(telemetry.frame(f"MOTION,{sample},0.000,0.5000"), delay_s=0.005)
-                answer = telemetry.frame(f"RANGE,{sample},{ranges[sample % 3]:.3f}")
-                board.send(answer, delay_s=2.3)
-    cycles = [round(row["awake_us"] * 16) for row in rows[4:]]
-    return _row(folder.name, compiled, board.report.stack_bytes, cycles)
+
+    def answers(line: SerialLine) -> Iterator[tuple[str, float]]:
+        sample = telemetry.requested_sample(line.text, "ODO")
+        if sample is not None:
+            yield telemetry.frame(f"MOTION,{sample},0.000,0.5000"), 0.005
+            yield telemetry.frame(f"RANGE,{sample},{ranges[sample % 3]:.3f}"), 2.3
+
+    cycles, stack = _samples(compiled.elf, 40, answers)
+    return _row(folder.name, compiled, stack, [round(count) for count in cycles[4:]])
 
 
 def _run_power_cuts(compiled: Compiled, folder: Path) -> Row:
     """Measure 125 samples, in one of which a checkpoint begins: the cycles awake in each."""
-    reader = telemetry.Reader()
-    rows: list[telemetry.Row] = []
     craft = Craft()
-    with Board(compiled.elf, limit_s=120.0) as board:
-        for event in board:
-            if not isinstance(event, SerialLine):
-                continue
-            row = reader.read(event.text)
-            if isinstance(row, dict):
-                rows.append(row)
-            if len(rows) == 126:
-                break
-            answer = craft.answer(event.text, event.time_s, clock=False)
-            if answer is not None:
-                board.send(answer, delay_s=0.01)
+
+    def answers(line: SerialLine) -> Iterator[tuple[str, float]]:
+        answer = craft.answer(line.text, line.time_s, clock=False)
+        if answer is not None:
+            yield answer, 0.01
+
+    cycles, stack = _samples(compiled.elf, 126, answers)
     # The first sample counts the start too.
-    cycles = [round(row["awake_us"] * 16) for row in rows[1:]]
-    return _row(folder.name, compiled, board.report.stack_bytes, cycles)
+    return _row(folder.name, compiled, stack, [round(count) for count in cycles[1:]])
 
 
 def _run_mission(compiled: Compiled, folder: Path) -> Row:
