@@ -201,13 +201,10 @@ class SlatModel : public bindings::SlatInterface<typename Filter::Scalar, Filter
   bool restore(const bindings::SlatStateView<Scalar>& state) override {
     StateReturner<Scalar> returner(state);
     Filter::visit_state(filter_, returner);
-    return returner.complete() && has_covariances();
+    return returner.complete() && has_covariances() && filter_.is_sound();
   }
 
  protected:
-  /// Whether what the filter keeps behind its slave and masters is sound, too.
-  virtual bool is_sound() const = 0;
-
   struct Echoes {
     explicit Echoes(const Heard& heard) {
       for (int s = 0; s < heard.count; ++s) {
@@ -249,7 +246,7 @@ class SlatModel : public bindings::SlatInterface<typename Filter::Scalar, Filter
       this->master(n, master.x, master.P);
       sound = check_slave(master) == Status::kOk;
     }
-    return sound && is_sound();
+    return sound;
   }
 };
 
@@ -324,9 +321,6 @@ class SlatfModel final : private Numbers<typename Filter::Scalar>, public SlatMo
       }
     }
   }
-
- private:
-  bool is_sound() const override { return this->filter_.is_sound(); }
 };
 
 /// EkfSlat or DeadReckoning.
@@ -367,15 +361,6 @@ class GaussianSlatModel final : public SlatModel<Filter> {
   void particles(Scalar*, Scalar*) const override {}
 
  private:
-  bool is_sound() const override { return is_sound(this->filter_); }
-  template <class Motion>
-  static bool is_sound(const DeadReckoning<Motion>&) {
-    return true;
-  }
-  template <class Other>
-  static bool is_sound(const Other& filter) {
-    return filter.is_sound();
-  }
   template <class Motion>
   static Belief<Scalar, 6> master_of(const DeadReckoning<Motion>&, int) {
     return Belief<Scalar, 6>();

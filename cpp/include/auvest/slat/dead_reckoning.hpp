@@ -71,6 +71,9 @@ class DeadReckoning : public SlatFilter<Motion_, 0> {
     visit(self.pose_);
   }
 
+  /// Whether the pose has a covariance: to ask of a state that was put back.
+  bool is_sound() const { return check_slave(pose_) == Status::kOk; }
+
   Scalar longest_step_s() const { return longest_step_s_; }
 
  private:
