@@ -12,6 +12,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
+from auvest.firmware import hil
+
 ROOT = Path(__file__).resolve().parents[2]
 HERE = ROOT / "firmware/parity"
 BENCH = ROOT / "firmware/bench"
@@ -25,8 +27,7 @@ PACKAGES = {
     "g++": "g++",
     "clang++": "clang",
     "avr-g++": "gcc-avr avr-libc",
-    "arm-none-eabi-g++": "gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib",
-    "qemu-system-arm": "qemu-system-arm",
+    **hil.PACKAGES,
 }
 
 #: Simulated seconds that a replay on the ATmega2560 may take.
@@ -117,10 +118,7 @@ class Target:
             command += ["--limit", str(_LIMIT_S), str(program)]
         else:
             require("qemu-system-arm")
-            arguments = ",".join(f"arg={part}" for part in ("replay", *files))
-            command = ["qemu-system-arm", "-machine", self.machine, "-nographic"]
-            command += ["-monitor", "none", "-serial", "none", "-kernel", str(program)]
-            command += ["-semihosting-config", f"enable=on,target=native,{arguments}"]
+            command = hil.qemu(self.machine, program, files)
         _run(command, f"replaying on {self.name}")
         return trace.read_bytes()
 
@@ -157,7 +155,8 @@ def _avr(name: str, *flags: str, library: tuple[Path, ...] = ()) -> Target:
     return Target(name, "avr-g++", common, "avr", library)
 
 
-def _cortex(name: str, machine: Literal["mps2-an385", "mps2-an386"], *flags: str) -> Target:
+def _cortex(name: str) -> Target:
+    machine, flags = hil.CORTEX[name]
     common = ("-O2", "-std=c++11", "-ffp-contract=off", "-mthumb", *flags, *_EIGEN, *_WARNINGS)
     common += ("-fno-exceptions", "-fno-rtti", "--specs=rdimon.specs", f"-T{BENCH / 'mps2.ld'}")
     return Target(name, "arm-none-eabi-g++", common, machine)
@@ -177,8 +176,8 @@ TARGETS = (
         library=tuple(sorted((ROOT / "firmware" / "library" / "src").glob("*.S"))),
     ),
     _avr("atmega2560-O2", "-O2"),
-    _cortex("cortex-m4f", "mps2-an386", "-mcpu=cortex-m4", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"),
-    _cortex("cortex-m3", "mps2-an385", "-mcpu=cortex-m3"),
+    _cortex("cortex-m4f"),
+    _cortex("cortex-m3"),
 )
 
 

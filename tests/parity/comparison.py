@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from auvest.firmware.hil import ulps
+
 
 def differing_bits(a: np.ndarray, b: np.ndarray) -> int:
     """How many bits differ between two traces."""
@@ -27,12 +29,3 @@ def _difference(wanted: np.generic, given: np.generic) -> str:
     a, b = (np.array(v).view(np.float32)[()] for v in (wanted, given))
     distance = ulps(wanted, given)
     return f"expected {a!s} ({wanted:#010x}), found {b!s} ({given:#010x}), {distance} ulp apart"
-
-
-def ulps(a: np.generic, b: np.generic) -> int:
-    """Distance of two floats, given by their bits, in steps from a float to the next; -0 is 0."""
-    return abs(_place(int(a)) - _place(int(b)))
-
-
-def _place(bits: int) -> int:
-    return 0x80000000 - bits if bits & 0x80000000 else bits

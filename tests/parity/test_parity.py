@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 from auvest import SelfTestPart, Status
+from auvest.firmware.hil import ulps
 from firmware.parity import golden
 from firmware.parity.targets import TARGETS
-from tests.parity.comparison import differing_bits, first_difference, ulps
+from tests.parity.comparison import differing_bits, first_difference
 from tests.parity.records import REFERENCED, SELF_TEST, TRACE, all_records, bytes_of, trace_of
 
 CONTROLS = Path(__file__).parent / "controls"

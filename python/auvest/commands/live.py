@@ -100,7 +100,7 @@ def rows_since(recording: Growing, since: int, title: str) -> dict[str, Any]:
             ]
             for row in rows
         ],
-        "sections": max((int(row.get("section", 1)) for row in recording.rows[-1:]), default=1),
+        "sections": int(recording.rows[-1]["section"]) if recording.rows else 1,
         "damaged": recording.damaged,
     }
 

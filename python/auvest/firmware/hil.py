@@ -11,7 +11,7 @@ import subprocess
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -36,7 +36,8 @@ TARGETS = {
 }
 SERIAL = "serial:"
 
-_CORTEX = {
+#: The board of QEMU and the flags of the compiler for each Cortex-M.
+CORTEX: dict[str, tuple[Literal["mps2-an385", "mps2-an386"], tuple[str, ...]]] = {
     "cortex-m3": ("mps2-an385", ("-mcpu=cortex-m3",)),
     "cortex-m4f": (
         "mps2-an386",
@@ -45,7 +46,8 @@ _CORTEX = {
 }
 _COMMON = ("-std=c++11", "-O2", "-ffp-contract=off")
 _CHIP = ("-DEIGEN_NO_IO", "-DEIGEN_NO_MALLOC", "-fno-exceptions", "-fno-rtti", "-mthumb")
-_PACKAGES = {
+#: The Debian packages of the commands for them.
+PACKAGES = {
     "arm-none-eabi-g++": "gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib",
     "qemu-system-arm": "qemu-system-arm",
 }
@@ -189,7 +191,7 @@ def run(
         lines = _on_host(program, folder, flags)
     elif target == "atmega2560":
         lines = _on_avr(program, folder, figures)
-    elif target in _CORTEX:
+    elif target in CORTEX:
         lines = _on_cortex(program, folder, target, flags)
     elif target.startswith(SERIAL):
         lines = over_serial(program, target.removeprefix(SERIAL), figures, progress)
@@ -220,8 +222,13 @@ def first_difference(there: Words, here: Words, fields: Sequence[str]) -> Differ
     of_target, of_desk = (float(word.view(np.float32) if column else word) for word in given)
     ulp = None
     if column and not np.isnan([of_target, of_desk]).any():
-        ulp = abs(_ordered(int(given[0])) - _ordered(int(given[1])))
+        ulp = ulps(*given)
     return Difference(row, fields[column], of_target, of_desk, int(given[0]), int(given[1]), ulp)
+
+
+def ulps(a: int | np.uint32, b: int | np.uint32) -> int:
+    """Give the distance of two float32, by their bits, in steps from a float to the next."""
+    return abs(_ordered(int(a)) - _ordered(int(b)))
 
 
 def _ordered(bits: int) -> int:
@@ -259,7 +266,7 @@ def _table(lines: Sequence[str], program: Bench, fields: int) -> Words:
 def _on_host(program: Bench, folder: Path, flags: Sequence[str]) -> list[str]:
     compiler, _ = find_compiler()
     built = build_host(program, folder, compiler, flags)
-    return _play(program, folder, "host", [str(built)])
+    return _play(program, folder, "host", lambda files: [str(built), *files])
 
 
 def build_host(
@@ -273,18 +280,16 @@ def build_host(
 
 
 def _on_cortex(program: Bench, folder: Path, target: str, flags: Sequence[str]) -> list[str]:
-    for name in _PACKAGES:
+    for name in PACKAGES:
         if shutil.which(name) is None:
-            raise HilError(f"{name} is not installed: apt install {_PACKAGES[name]}")
-    machine, chip = _CORTEX[target]
+            raise HilError(f"{name} is not installed: apt install {PACKAGES[name]}")
+    machine, chip = CORTEX[target]
     built = folder / f"bench-{target}.elf"
     command = ["arm-none-eabi-g++", *_COMMON, *_CHIP, *chip, *flags, *_includes(program, folder)]
     command += ["--specs=rdimon.specs", f"-T{_source('mps2.ld')}"]
     command += [str(_source("main.cpp")), str(_source("cortex_m.cpp")), "-o", str(built)]
     _call(command, f"compiling for {target}")
-    qemu = ["qemu-system-arm", "-machine", machine, "-nographic", "-monitor", "none"]
-    qemu += ["-serial", "none", "-kernel", str(built)]
-    return _play(program, folder, target, qemu)
+    return _play(program, folder, target, lambda files: qemu(machine, built, files))
 
 
 def _on_avr(program: Bench, folder: Path, figures: dict[str, int]) -> list[str]:
@@ -316,14 +321,20 @@ def build_sketch(program: Bench, folder: Path, *, serial: bool = False) -> Compi
     return compile_sketch(sketch, package(folder), folder / "compiled")
 
 
-def _play(program: Bench, folder: Path, target: str, command: Sequence[str]) -> list[str]:
+def qemu(machine: str, program: Path, arguments: Sequence[str]) -> list[str]:
+    """Give the command that runs a program on a board of QEMU, its files those of this computer."""
+    given = ",".join(f"arg={part}" for part in (program.stem, *arguments))
+    command = ["qemu-system-arm", "-machine", machine, "-nographic", "-monitor", "none"]
+    command += ["-serial", "none", "-kernel", str(program)]
+    return [*command, "-semihosting-config", f"enable=on,target=native,{given}"]
+
+
+def _play(
+    program: Bench, folder: Path, target: str, command: Callable[[list[str]], list[str]]
+) -> list[str]:
     """Run a program that reads the rows from a file and writes its answers to one."""
     rows, answers = _files(program, folder, target)
-    names = [str(rows), str(answers)]
-    if command[0] == "qemu-system-arm":
-        arguments = ",".join(f"arg={part}" for part in ("bench", *names))
-        names = ["-semihosting-config", f"enable=on,target=native,{arguments}"]
-    _call([*command, *names], f"running on {target}")
+    _call(command([str(rows), str(answers)]), f"running on {target}")
     return answers.read_text("ascii").splitlines()
 
 
