@@ -22,6 +22,7 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import TypeAlias
 
@@ -277,6 +278,7 @@ def _slatf_record() -> bytes:
     return b"".join(part.tobytes() for part in (world.slave, world.master, readings, end))
 
 
+@cache
 def _words(program: str) -> bytes:
     """Give the record that a program is played."""
     template = _PROGRAMS[program][0]
