@@ -80,7 +80,7 @@ def test_pages_are_the_committed_tables():
 
 
 def test_fit_knows_the_chips_and_filters_of_the_table():
-    assert tuple(fit.CHIPS) == budgets.TARGETS
+    assert tuple(fit.CHIPS) == tuple(fit.SHORT) == budgets.TARGETS
     assert set(fit._PROGRAMS) == set(budgets.FILTERS)
     particles = {"slatf1": budgets.AVR_PARTICLES, "slatf2": budgets.AVR_PARTICLES}
     particles |= {"slatf-joint": budgets.JOINT_PARTICLES, "slatf-shared": budgets.SHARED_PARTICLES}

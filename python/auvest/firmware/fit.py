@@ -27,6 +27,18 @@ CHIPS = {
     "riscv32imc": "RISC-V RV32IMC: ESP32-C3",
 }
 
+#: The same, for the head of a column.
+SHORT = {
+    "atmega328p": "328P",
+    "atmega2560": "2560",
+    "cortex-m0": "M0",
+    "cortex-m0plus": "M0+",
+    "cortex-m3": "M3",
+    "cortex-m4f": "M4F",
+    "cortex-m7": "M7",
+    "riscv32imc": "RV32",
+}
+
 #: What the programs hold, by the names of budgets.csv. Six states are those of an acceleration
 #: model, two are a position.
 _PROGRAMS = {
