@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from auvest import _core, telemetry
-from auvest.board import BoardError, PinChange, Report, SerialLine
+from auvest.board import PinChange, Report, SerialLine
 from auvest.commands.capture import TRIGGER_PIN
 from auvest.firmware.sketch import SketchError
 from firmware.parity import slatf
@@ -324,28 +324,3 @@ def test_a_gate_with_a_way_back(build_edited, play, on_the_host):
     for row, wanted in zip(pinged, trace, strict=True):
         assert row["master_x_m"] == float(wanted["masters"][0]["x"][0].view(np.float32))
         assert row["x_m"] == float(wanted["slave_x"][0].view(np.float32))
-
-
-@pytest.mark.parametrize(
-    "name", ["beacon_navigation", "mission", "slave_tracking", "tracking_loop"]
-)
-def test_a_loop_that_hangs_is_ended_by_the_watchdog(name, build_edited, board):
-    """Two seconds after the loop is first fed; where instruments are silent, nothing bites."""
-    hang = ("  wdt_reset();\n\n", "  wdt_reset();\n  for (;;) {\n  }\n\n")
-    if name == "mission":  # which waits for the vehicle first
-        hang = ("    vehicle.announce();\n", "    for (;;) {\n    }\n")
-    elf = build_edited(name, [(f"{name}.ino", *hang)]).elf
-    bites = pytest.raises(BoardError, match="reset by the watchdog")
-    with bites as error, board(elf, for_s=4.0) as running:
-        running.run()
-    at_s = error.value.report.cycles / error.value.report.frequency_hz
-    assert 2.0 < at_s < 2.0 * 1.1 + 0.2
-
-
-@pytest.mark.parametrize(
-    "name", ["beacon_navigation", "mission", "slave_tracking", "tracking_loop"]
-)
-def test_a_sketch_whose_instruments_are_silent_is_not_ended(name, build_sketch, board, root):
-    elf = build_sketch(root / "firmware/library/examples" / name).elf
-    with board(elf, for_s=6.0) as running:
-        assert running.run().reason == "elapsed"
