@@ -89,6 +89,8 @@ STEPS.update(pilot_steer=1_000, pilot_predict=1_000, pilot_update=199)  # one fi
 JOINT_PARTICLES = 32
 #: Of SlatfShared, which takes 36 bytes for each: as many as the paper has on the desk.
 SHARED_PARTICLES = 100
+#: Of them in the sketch slave_tracking.
+SKETCH_PARTICLES = 64
 
 #: Echoes that SLATF and its relatives are measured over, and the seconds between two of them.
 ECHOES = 25
@@ -833,15 +835,15 @@ def slatf_page(rows: list[Row]) -> list[str]:
         "## What SLATF takes",
         "",
         f"The paper's sonar pings every {SONAR_PERIOD_S:g} s, with two readings of the odometry in",
-        "between. The cycles of one such step, divided by the particles; `slave_tracking` has its",
-        "serial line and both estimates beside them:",
+        "between. The cycles of one such step, divided by the particles; `slave_tracking`, which",
+        "is `slatf_shared`, has its serial line and both estimates beside them:",
         "",
         "| program | particles | cycles per particle and step | of the sonar period |",
         "|---|---:|---:|---:|",
     ]
-    counts = dict.fromkeys(("slatf1", "slatf2", "slave_tracking"), AVR_PARTICLES)
+    counts = {"slatf1": AVR_PARTICLES, "slatf2": AVR_PARTICLES}
     counts.update(slatf_joint=JOINT_PARTICLES, slatf_shared=SHARED_PARTICLES)
-    counts.update(ekf_slat=0, ekf_slat_imm=0)
+    counts.update(slave_tracking=SKETCH_PARTICLES, ekf_slat=0, ekf_slat_imm=0)
     for name, particles in counts.items():
         cycles = by_name[name].cycles_median
         if cycles is None:
@@ -849,17 +851,19 @@ def slatf_page(rows: list[Row]) -> list[str]:
         share = cycles / (16e6 * SONAR_PERIOD_S)
         each = f"{cycles // particles:,}" if particles else ""
         lines.append(f"| `{name}` | {particles or ''} | {each} | {share:.1%} |")
-    slave = by_name["slave_tracking"]
+    slave, shared = by_name["slave_tracking"], by_name["slatf_shared"]
     asleep = 1 - awake_share(slave)
     particles = 4 * fields_of("slatf2") * AVR_PARTICLES
+    left = 8_192 - shared.static_ram_bytes - shared.stack_bytes
     return [
         *lines,
         "",
         "Asked: 40 particles that meet the sonar period, with half of the time asleep. Measured,",
-        f"with {AVR_PARTICLES}: {asleep:.0%} asleep where it is least. Particles come in blocks of",
-        f"16: of the 8,192 B of RAM {AVR_PARTICLES} of SLATF 2.0 take {particles:,}, what else is",
-        f"static in the sketch {slave.static_ram_bytes - particles:,}, the stack "
-        f"{slave.stack_bytes:,}.",
+        f"in the sketch with {SKETCH_PARTICLES}: {asleep:.0%} asleep where it is least; its echo",
+        "comes back after as much as 0.6 s, and is told before the next reading, 0.4 s later.",
+        f"Particles come in blocks of 16: of the 8,192 B of RAM {AVR_PARTICLES} of SLATF 2.0 take",
+        f"{particles:,}. With one covariance {SHARED_PARTICLES} leave {left:,} B of it beside the",
+        "stack.",
     ]
 
 

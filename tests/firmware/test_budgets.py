@@ -109,7 +109,10 @@ def test_aukf_does_what_the_design_asks(measured):
     assert [target.name for target in budgets.targets(measured) if not target.met] == []
 
 
-def test_slatf_sleeps_half_of_the_sonar_period(rows):
+def test_slatf_sleeps_half_of_the_sonar_period(rows, root):
+    config = (root / "firmware/library/examples/slave_tracking/config.h").read_text()
+    assert f"kParticles = {budgets.SKETCH_PARTICLES};" in config
+    assert budgets.SKETCH_PARTICLES >= 40
     assert budgets.AVR_PARTICLES >= 40
     assert budgets.awake_share(rows["slave_tracking"]) < 0.5
 
