@@ -6,6 +6,7 @@ The world is the paper's scenario. What the sketch reported as measured is repla
 (firmware/parity), and everything that it computed must follow from it.
 """
 
+import os
 import re
 from dataclasses import dataclass, field
 from functools import reduce
@@ -109,6 +110,12 @@ def play(board):
     return play
 
 
+@pytest.fixture(scope="module")
+def sketch(build_edited):
+    """Return the sketch as it comes, compiled."""
+    return build_edited("slave_tracking").elf
+
+
 @pytest.fixture(scope="session")
 def on_the_host(tmp_path_factory):
     """Return a function that replays on the host what a run has measured."""
@@ -170,9 +177,17 @@ def assert_same_bits(run, trace):
         assert row["status"] == wanted["status"] == 0
 
 
-@pytest.mark.parametrize("kind", [SHARED, *PAPER])
-def test_a_minute_with_the_bits_of_the_host(kind, build_edited, play, on_the_host):
-    settings, particles = {}, PARTICLES
+def kinds():
+    yield from (SHARED, "slatf2")
+    slow = "AUVEST_SLOW_TESTS" in os.environ
+    yield pytest.param(
+        "slatf1", marks=pytest.mark.skipif(not slow, reason="AUVEST_SLOW_TESTS is not set")
+    )
+
+
+@pytest.mark.parametrize("kind", list(kinds()))
+def test_a_minute_with_the_bits_of_the_host(kind, sketch, build_edited, play, on_the_host):
+    particles, elf = PARTICLES, sketch
     if kind in PAPER:  # with as many as the chip has room for, and nothing that guards it
         particles = AVR_PARTICLES
         filter_ = (
@@ -180,8 +195,9 @@ def test_a_minute_with_the_bits_of_the_host(kind, build_edited, play, on_the_hos
             "auvest::OneLane<float>, auvest::NoSafeguards>"
         )
         settings = {"Filter": filter_, "kParticles": particles, "kGate": 0, "kStackReserve": 1280}
+        elf = build_edited("slave_tracking", **settings).elf
     samples = 61 if kind == SHARED else 16
-    run = play(build_edited("slave_tracking", **settings).elf, samples)
+    run = play(elf, samples)
     assert_same_bits(run, on_the_host(run, kind))
     assert np.isfinite(run.column("range_m")).sum() == samples // 2
     assert run.column("resamplings")[-1] > 0
@@ -256,7 +272,7 @@ def test_what_does_not_come_is_missed_and_nothing_else(build_edited, play, on_th
 IMPLAUSIBLE, IMPOSSIBLE_RANGE = 14, 11  # of Status in auvest/status.hpp
 
 
-def test_what_cannot_be_is_named_and_not_taken(build_edited, play, on_the_host):
+def test_what_cannot_be_is_named_and_not_taken(sketch, play, on_the_host):
     """Beyond a limit of the value or of its change: counted, and as if it had not come."""
     range_m = float(paper_world().readings["z"][3][0])
     readings = {3: (25.0, 0.5), 5: (5.0, 30.0), 7: (-21.0, 0.5)}
@@ -273,7 +289,7 @@ def test_what_cannot_be_is_named_and_not_taken(build_edited, play, on_the_host):
             return echo(sample)
         return [(0.4, telemetry.answer(sample, *echoes[sample]))]
 
-    run = play(build_edited("slave_tracking").elf, 12, motion_, echo_)
+    run = play(sketch, 12, motion_, echo_)
     wrong = [3, 4, 5, 6, 7, 8]
     assert [row["sample"] for row in run.rows if row["status"]] == wrong
     assert run.column("implausible").tolist() == [0, 0, 1, 2, 3, 4, 5, 6, 6, 6, 6, 6]
@@ -300,19 +316,18 @@ def test_more_particles_do_not_compile(build_edited):
         build_edited("slave_tracking", kParticles="160")
 
 
-def test_a_gate_with_a_way_back(build_edited, play, on_the_host):
+def test_a_gate_with_a_way_back(sketch, play, on_the_host):
     """Echoes far off the estimate are refused and named; six that agree are a master reborn.
 
-    From sample 6 on the sonar hears the master 100 m further away, as if it had moved in silence.
+    From sample 6 on the sonar hears the master 60 m further away, as if it had moved in silence.
     """
 
     def echo_(sample):
         range_m, bearing = paper_world().readings["z"][sample - 1]
-        range_m += 100.0 if sample >= 6 else 0.0
+        range_m += 60.0 if sample >= 6 else 0.0
         return [(0.45, telemetry.answer(sample, range_m, bearing))]
 
-    elf = build_edited("slave_tracking", kFastestApproach=300).elf
-    run = play(elf, 20, motion, echo_)
+    run = play(sketch, 20, motion, echo_)
     pinged = [row for row in run.rows if row["sample"] % 2 == 0]
     assert [row["gated"] for row in pinged] == [0, 0, 1, 2, 3, 4, 5, 6, 6, 6]
     assert [row["rebirths"] for row in pinged] == [0] * 7 + [1] * 3
