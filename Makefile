@@ -18,7 +18,8 @@ export CMAKE_BUILD_PARALLEL_LEVEL := $(shell nproc)
 PACKAGES := g++ cmake ninja-build libeigen3-dev libxsimd-dev python3-dev python3-venv
 FIRMWARE_PACKAGES := arduino-builder arduino-core-avr gcc-avr avr-libc binutils-avr \
     simavr libsimavr-dev libelf-dev \
-    gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib qemu-system-arm
+    gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib qemu-system-arm \
+    gcc-riscv64-unknown-elf picolibc-riscv64-unknown-elf qemu-system-misc
 DEV_PACKAGES := $(PACKAGES) $(FIRMWARE_PACKAGES) \
     clang libclang-rt-dev doctest-dev clang-format valgrind chromium
 

@@ -1,10 +1,13 @@
 """Measure what auvest takes on the chip: flash, RAM, stack and cycles, on the simulated board.
 
     python -m firmware.budgets            compare with firmware/budgets.csv
-    python -m firmware.budgets --write    write firmware/budgets.csv and docs/budgets.md anew
+    python -m firmware.budgets --write    write firmware/budgets.csv and its two pages of docs anew
+    python -m firmware.budgets --target cortex-m0 --target atmega328p     these only
 
-Every program is a sketch, compiled as the Arduino IDE does, with the library from its zip. Cycles
-of the simulated chip are exact: the same program takes the same number each time.
+On the ATmega2560 every program is measured, on other chips one of each filter. On an AVR a program
+is a sketch, compiled as the Arduino IDE does, with the library from its zip; cycles of the
+simulated chip are exact: the same program takes the same number each time. Elsewhere it is compiled
+with the options of Arduino's cores and runs in QEMU (firmware/chips.py), which counts no cycles.
 """
 
 from __future__ import annotations
@@ -12,12 +15,14 @@ from __future__ import annotations
 import argparse
 import csv
 import os
+import re
 import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import TypeAlias
 
@@ -26,7 +31,7 @@ import numpy as np
 from auvest import mission_line, telemetry
 from auvest.board import Board, BoardError, SerialLine
 from auvest.firmware.package import package
-from auvest.firmware.sketch import Compiled, SketchError, compile_sketch
+from auvest.firmware.sketch import MEGA2560, UNO, Compiled, SketchError, compile_sketch
 from auvest.simulation import cooperative
 from auvest.simulation.paper_aukf import FilterName, paper_filter, paper_noise
 from auvest.simulation.tracking import Scenario, Track, simulate
@@ -39,6 +44,8 @@ from auvest.simulation.vehicle_in_the_loop import (
     new_pilot,
     new_world,
 )
+from firmware import chips
+from firmware.chips import CHIPS, ChipError
 from firmware.parity.slatf import fields_of, paper_world
 from firmware.parity.targets import AVR_PARTICLES
 from firmware.parity.vehicle import MissionRecord, zigzag
@@ -47,10 +54,15 @@ from firmware.power_cuts import Craft
 ROOT = Path(__file__).resolve().parents[1]
 BUDGETS = ROOT / "firmware" / "budgets.csv"
 PAGE = ROOT / "docs" / "budgets.md"
+BOARDS_PAGE = ROOT / "docs" / "boards.md"
 EXAMPLES = ROOT / "firmware" / "library" / "examples"
 SKETCHES = ROOT / "firmware" / "budget_sketches"
 
 TARGET = "atmega2560"
+SMALL_AVR = "atmega328p"
+#: The boards of Arduino with these chips.
+AVR_BOARDS = {TARGET: MEGA2560, SMALL_AVR: UNO}
+TARGETS = (SMALL_AVR, TARGET, *CHIPS)
 
 #: Growth beyond this share of a committed figure is refused.
 TOLERANCE = 0.02
@@ -75,8 +87,10 @@ STEPS.update(pilot_steer=1_000, pilot_predict=1_000, pilot_update=199)  # one fi
 
 #: Particles of SlatfJoint: whole blocks that the RAM holds beside the stack.
 JOINT_PARTICLES = 32
-#: Of SlatfShared, which takes 36 bytes for each.
-SHARED_PARTICLES = 96
+#: Of SlatfShared, which takes 36 bytes for each: as many as the paper has on the desk.
+SHARED_PARTICLES = 100
+#: Of them in the sketch slave_tracking.
+SKETCH_PARTICLES = 64
 
 #: Echoes that SLATF and its relatives are measured over, and the seconds between two of them.
 ECHOES = 25
@@ -91,6 +105,15 @@ COLUMNS = (
     "cycles_min",
     "cycles_median",
     "cycles_max",
+)
+
+
+#: What is measured on every chip: a program of each filter, and the pilot. Of those that are timed
+#: in parts, the update.
+FILTERS = (
+    *("ekf", "ukf", "ckf", "robust_ukf", "aukf", "aukf_covariance_budget", "robust_ekf_update"),
+    *("unknown_start_update", "model_aided_update", "ekf_slat", "ekf_slat_imm"),
+    *("slatf1", "slatf2", "slatf_joint", "slatf_shared", "pilot_update"),
 )
 
 
@@ -257,6 +280,15 @@ def _slatf_record() -> bytes:
     return b"".join(part.tobytes() for part in (world.slave, world.master, readings, end))
 
 
+@cache
+def _words(program: str) -> bytes:
+    """Give the record that a program is played."""
+    template = _PROGRAMS[program][0]
+    if template == "slatf":
+        return _slatf_record()
+    return _pilot_record() if template == "pilot" else _record(program)
+
+
 def _record(program: str) -> bytes:
     """Start, variances and the steps of a vehicle that circles through the station."""
     template = _PROGRAMS[program][0]
@@ -344,7 +376,7 @@ def _pilot_record() -> bytes:
 
 
 def measure(output: Path) -> list[Row]:
-    """Compile all programs and run them on the simulated board.
+    """Compile all programs for the ATmega2560 and run them on the simulated board.
 
     Parameters
     ----------
@@ -357,10 +389,8 @@ def measure(output: Path) -> list[Row]:
         `empty`, the filters, the examples.
     """
     library = package(output)
-    runners = {"empty": _run_empty, "slatf": _run_slatf, "pilot": _run_pilot}
-    programs: dict[str, Callable[[Compiled, Path], Row]] = {
-        program: runners.get(template, _run_filter) for program, (template, _) in _PROGRAMS.items()
-    }
+    programs: dict[str, Callable[[Compiled, Path], Row]] = dict.fromkeys(_PROGRAMS, _run_on_board)
+    programs["empty"] = _run_empty
     programs["first_steps"] = _run_first_steps
     programs["replay"] = _run_replay
     programs["tracking_loop"] = _run_tracking_loop
@@ -387,11 +417,73 @@ def measure(output: Path) -> list[Row]:
         return [run.result() for run in runs.values()]
 
 
-def _row(program: str, compiled: Compiled, stack_bytes: int, cycles: list[int]) -> Row:
+def measure_elsewhere(output: Path, wanted: Iterable[tuple[str, str]] | None = None) -> list[Row]:
+    """Measure filters on the chips beside the ATmega2560.
+
+    Parameters
+    ----------
+    output : Path
+        A folder for what is built.
+    wanted : iterable of (str, str), optional
+        Targets and programs; default: all of :data:`FILTERS` on all of them.
+
+    Returns
+    -------
+    list of Row
+        Without those that do not fit into an ATmega328P.
+    """
+    if wanted is None:
+        wanted = [(name, program) for name in TARGETS if name != TARGET for program in FILTERS]
+    rows = []
+    for target, program in wanted:
+        folder = output / target / program
+        folder.mkdir(parents=True, exist_ok=True)
+        row = (
+            _measure_small_avr(program, folder, output)
+            if target == SMALL_AVR
+            else _measure_chip(CHIPS[target], program, folder)
+        )
+        if row is not None:
+            rows.append(row)
+    return rows
+
+
+def _measure_small_avr(program: str, folder: Path, output: Path) -> Row | None:
+    (folder / f"{program}.ino").write_text(_source(program), encoding="utf-8")
+    shutil.copy(ROOT / "firmware" / "board" / "board.hpp", folder)
+    try:
+        compiled = compile_sketch(
+            folder, package(output), output / f"compiled-{SMALL_AVR}", board=AVR_BOARDS[SMALL_AVR]
+        )
+    except SketchError as error:
+        if re.search(r"will not fit in region|is not within region", str(error)):
+            return None
+        raise
+    try:
+        return _run_on_board(compiled, folder, SMALL_AVR)
+    except BoardError as error:
+        if error.report.reason == "stack overflow":
+            return None
+        raise
+
+
+def _measure_chip(chip: chips.Chip, program: str, folder: Path) -> Row:
+    source = folder / f"{program}.cpp"
+    main = "\nint main() {\n  setup();\n  for (;;) loop();\n}\n"
+    source.write_text(_source(program) + main, encoding="utf-8")
+    built = chips.build(chip, [source], folder / "program.elf")
+    run = chips.run(chip, built, _words(program), folder / "run")
+    sizes = chips.sizes(chip, built)
+    return Row(chip.name, program, sizes.flash, sizes.ram, run.stack_bytes, None, None, None)
+
+
+def _row(
+    program: str, compiled: Compiled, stack_bytes: int, cycles: list[int], target: str = TARGET
+) -> Row:
     low, median, high = (
         (min(cycles), int(np.median(cycles)), max(cycles)) if cycles else (None, None, None)
     )
-    return Row(TARGET, program, compiled.flash, compiled.ram, stack_bytes, low, median, high)
+    return Row(target, program, compiled.flash, compiled.ram, stack_bytes, low, median, high)
 
 
 def _run_empty(compiled: Compiled, folder: Path) -> Row:
@@ -400,28 +492,18 @@ def _run_empty(compiled: Compiled, folder: Path) -> Row:
     return _row(folder.name, compiled, report.stack_bytes, [])
 
 
-def _run_filter(compiled: Compiled, folder: Path) -> Row:
-    return _run_record(compiled, folder, _record(folder.name), STEPS[folder.name])
-
-
-def _run_slatf(compiled: Compiled, folder: Path) -> Row:
-    return _run_record(compiled, folder, _slatf_record(), ECHOES)
-
-
-def _run_pilot(compiled: Compiled, folder: Path) -> Row:
-    return _run_record(compiled, folder, _pilot_record(), STEPS[folder.name])
-
-
-def _run_record(compiled: Compiled, folder: Path, words: bytes, steps: int) -> Row:
+def _run_on_board(compiled: Compiled, folder: Path, target: str = TARGET) -> Row:
+    """Run the program of a filter on its record."""
+    steps = ECHOES if _PROGRAMS[folder.name][0] == "slatf" else STEPS[folder.name]
     record = folder / "record.bin"
-    record.write_bytes(words)
-    with Board(compiled.elf, input=record, limit_s=1000.0) as board:
+    record.write_bytes(_words(folder.name))
+    with Board(compiled.elf, mcu=target, input=record, limit_s=1000.0) as board:
         report = board.run()
     step = report.sections[1]
     if step.count != steps:
         raise BudgetError(f"{folder.name}: {step.count} steps instead of {steps}")
     cycles = [step.minimum, step.median, step.maximum]
-    return _row(folder.name, compiled, report.stack_bytes, cycles)
+    return _row(folder.name, compiled, report.stack_bytes, cycles, target)
 
 
 def _run_first_steps(compiled: Compiled, folder: Path) -> Row:
@@ -579,14 +661,16 @@ def write_budgets(rows: list[Row], path: Path = BUDGETS) -> None:
 
 
 def page(rows: list[Row]) -> str:
-    """Return the page of the documentation."""
+    """Return the page of the documentation on the ATmega2560."""
+    rows = [row for row in rows if row.target == TARGET]
     empty = next(row for row in rows if row.program == "empty")
     lines = [
         "# What it takes on the chip",
         "",
         "Written by `python -m firmware.budgets --write`; the tests measure again and refuse",
         f"growth beyond {TOLERANCE:.0%}. ATmega2560 at 16 MHz, simulated; every program is a",
-        "sketch, compiled with the Arduino IDE's own options (-Os -flto, avr-gcc of Debian).",
+        "sketch, compiled with the Arduino IDE's own options (-Os -flto, avr-gcc of Debian). Other",
+        "chips: [boards.md](boards.md).",
         "",
         "| program | flash | above the empty sketch | static RAM | stack | cycles per step: min "
         "| median | max | median at 16 MHz |",
@@ -616,11 +700,7 @@ def page(rows: list[Row]) -> str:
         f"{ECHOES} times at the beginning of the paper's scenario; `slatf_joint`: the same with",
         f"N = {JOINT_PARTICLES}; `slatf_shared`: with one covariance, N = {SHARED_PARTICLES},",
         "a gate and recovery; `ekf_slat` and, with the three models of an `Imm` for the master,",
-        "`ekf_slat_imm`: the same without particles. The examples: `first_steps` is its whole run,",
-        "serial text included; `replay` counts predict, update and feedback by the chip's timer;",
-        "`tracking_loop` counts the cycles awake between two samples, `slave_tracking` those",
-        "between two pings, serial text included.",
-        f"{ECHOES} times at the beginning of the paper's scenario. The examples: `first_steps` is",
+        "`ekf_slat_imm`: the same without particles. The examples: `first_steps` is",
         "its whole run, serial text included; `replay` counts predict, update and feedback by the",
         "chip's timer; `tracking_loop` counts the cycles awake between two samples,",
         "`slave_tracking` those between two pings, `beacon_navigation` those of a sample with a",
@@ -647,6 +727,68 @@ def page(rows: list[Row]) -> str:
     lines += slatf_page(rows)
     lines += vehicle_page(rows)
     return "\n".join([*lines, ""])
+
+
+#: How the page names the chips.
+_CHIP_NAMES = {
+    SMALL_AVR: "ATmega328P",
+    TARGET: "ATmega2560",
+    "cortex-m0": "Cortex-M0",
+    "cortex-m0plus": "Cortex-M0+",
+    "cortex-m3": "Cortex-M3",
+    "cortex-m4f": "Cortex-M4F",
+    "cortex-m7": "Cortex-M7",
+    "riscv32imc": "RV32IMC",
+}
+
+
+def boards_page(rows: list[Row]) -> str:
+    """Return the page of the documentation on all chips."""
+    found = {(row.target, row.program): row for row in rows}
+
+    def table(cell: Callable[[Row], str], targets: Iterable[str]) -> list[str]:
+        names = [_CHIP_NAMES[target] for target in targets]
+        lines = ["", f"| filter | {' | '.join(names)} |", f"|---|{'---:|' * len(names)}"]
+        for program in FILTERS:
+            cells = [
+                cell(found[target, program]) if (target, program) in found else "-"
+                for target in targets
+            ]
+            lines.append(f"| `{program}` | {' | '.join(cells)} |")
+        return lines
+
+    avr = (SMALL_AVR, TARGET)
+    return "\n".join(
+        [
+            "# Every filter on every board",
+            "",
+            "Written by `python -m firmware.budgets --write`; the tests measure some of it again",
+            f"and refuse growth beyond {TOLERANCE:.0%}. What each program is:",
+            "[budgets.md](budgets.md); those that are timed there in parts are one program here.",
+            "Which of them fit a chip of yours: `auvest fit --ram 2048 --flash 32256`.",
+            "",
+            "`-`: does not fit the chip. On an AVR a program is a sketch of the Arduino IDE, with",
+            "its core. Elsewhere it is compiled by Debian's compilers as Arduino's cores do",
+            "(-Os, no link-time optimisation, newlib-nano or picolibc), without a core, and",
+            "without the start-up of the emulated board. Flash is code, constants and what the",
+            "variables start from. An ATmega328P has 32,256 B of flash beside the bootloader, and",
+            "2,048 B of RAM.",
+            "",
+            "## Flash, bytes",
+            *table(lambda row: f"{row.flash_bytes:,}", TARGETS),
+            "",
+            "## Static RAM + stack, bytes",
+            "",
+            "The stack is the deepest of the whole run.",
+            *table(lambda row: f"{row.static_ram_bytes:,} + {row.stack_bytes:,}", TARGETS),
+            "",
+            "## Cycles of a step, median / largest",
+            "",
+            "Of the two chips that are simulated to the cycle; QEMU's time is not a chip's.",
+            *table(lambda row: f"{row.cycles_median:,} / {row.cycles_max:,}", avr),
+            "",
+        ]
+    )
 
 
 #: What the vehicle's own part of a period is made of; cycles that were asked for, in the median.
@@ -693,15 +835,15 @@ def slatf_page(rows: list[Row]) -> list[str]:
         "## What SLATF takes",
         "",
         f"The paper's sonar pings every {SONAR_PERIOD_S:g} s, with two readings of the odometry in",
-        "between. The cycles of one such step, divided by the particles; `slave_tracking` has its",
-        "serial line and both estimates beside them:",
+        "between. The cycles of one such step, divided by the particles; `slave_tracking`, which",
+        "is `slatf_shared`, has its serial line and both estimates beside them:",
         "",
         "| program | particles | cycles per particle and step | of the sonar period |",
         "|---|---:|---:|---:|",
     ]
-    counts = dict.fromkeys(("slatf1", "slatf2", "slave_tracking"), AVR_PARTICLES)
+    counts = {"slatf1": AVR_PARTICLES, "slatf2": AVR_PARTICLES}
     counts.update(slatf_joint=JOINT_PARTICLES, slatf_shared=SHARED_PARTICLES)
-    counts.update(ekf_slat=0, ekf_slat_imm=0)
+    counts.update(slave_tracking=SKETCH_PARTICLES, ekf_slat=0, ekf_slat_imm=0)
     for name, particles in counts.items():
         cycles = by_name[name].cycles_median
         if cycles is None:
@@ -709,17 +851,19 @@ def slatf_page(rows: list[Row]) -> list[str]:
         share = cycles / (16e6 * SONAR_PERIOD_S)
         each = f"{cycles // particles:,}" if particles else ""
         lines.append(f"| `{name}` | {particles or ''} | {each} | {share:.1%} |")
-    slave = by_name["slave_tracking"]
+    slave, shared = by_name["slave_tracking"], by_name["slatf_shared"]
     asleep = 1 - awake_share(slave)
     particles = 4 * fields_of("slatf2") * AVR_PARTICLES
+    left = 8_192 - shared.static_ram_bytes - shared.stack_bytes
     return [
         *lines,
         "",
         "Asked: 40 particles that meet the sonar period, with half of the time asleep. Measured,",
-        f"with {AVR_PARTICLES}: {asleep:.0%} asleep where it is least. Particles come in blocks of",
-        f"16: of the 8,192 B of RAM {AVR_PARTICLES} of SLATF 2.0 take {particles:,}, what else is",
-        f"static in the sketch {slave.static_ram_bytes - particles:,}, the stack "
-        f"{slave.stack_bytes:,}.",
+        f"in the sketch with {SKETCH_PARTICLES}: {asleep:.0%} asleep where it is least; its echo",
+        "comes back after as much as 0.6 s, and is told before the next reading, 0.4 s later.",
+        f"Particles come in blocks of 16: of the 8,192 B of RAM {AVR_PARTICLES} of SLATF 2.0 take",
+        f"{particles:,}. With one covariance {SHARED_PARTICLES} leave {left:,} B of it beside the",
+        "stack.",
     ]
 
 
@@ -763,26 +907,42 @@ def main() -> int:
     """Run the command line."""
     parser = argparse.ArgumentParser(
         prog="firmware.budgets",
-        description="Measure flash, RAM, stack and cycles of every program on the simulated chip, "
+        description="Measure flash, RAM, stack and cycles of every program on the simulated chips, "
         "and compare them with firmware/budgets.csv. The simulated board must be built: "
         "cmake -S . -B build/firmware -D AUVEST_BUILD_FIRMWARE=ON && cmake --build build/firmware; "
         "then set AUVEST_BOARD to the path of auvest-board.",
     )
     parser.add_argument(
-        "--write", action="store_true", help="write firmware/budgets.csv and docs/budgets.md anew"
+        "--write",
+        action="store_true",
+        help="write firmware/budgets.csv, docs/budgets.md and docs/boards.md anew",
+    )
+    parser.add_argument(
+        "--target",
+        action="append",
+        choices=TARGETS,
+        help="measure this chip only; may be repeated (default: all)",
     )
     arguments = parser.parse_args()
+    chosen = [name for name in TARGETS if name in (arguments.target or TARGETS)]
     try:
         with tempfile.TemporaryDirectory() as folder:
-            rows = measure(Path(folder))
-    except (BoardError, BudgetError, SketchError, FileNotFoundError) as error:
+            rows = measure(Path(folder)) if TARGET in chosen else []
+            elsewhere = [name for name in chosen if name != TARGET]
+            wanted = [(name, program) for name in elsewhere for program in FILTERS]
+            rows += measure_elsewhere(Path(folder), wanted)
+    except (BoardError, BudgetError, ChipError, SketchError, FileNotFoundError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
+    committed = read_budgets()
     if arguments.write:
+        rows += [row for row in committed if row.target not in chosen]
+        rows.sort(key=lambda row: TARGETS.index(row.target))  # programs stay in their order
         write_budgets(rows)
         PAGE.write_text(page(rows), encoding="utf-8")
+        BOARDS_PAGE.write_text(boards_page(rows), encoding="utf-8")
         return 0
-    lines = growth(rows, read_budgets())
+    lines = growth(rows, [row for row in committed if row.target in chosen])
     for line in lines:
         print(f"error: {line}", file=sys.stderr)
     return 1 if lines else 0

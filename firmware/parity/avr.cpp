@@ -1,5 +1,5 @@
-// The replay on an ATmega2560: the board's input stream gives the record, its output stream takes
-// the trace.
+// The replay on a board without files, the ATmega2560 or one of QEMU (firmware/qemu): its input
+// stream gives the record, its output stream takes the trace.
 #include "board.hpp"
 #include AUVEST_REPLAY
 

@@ -34,6 +34,7 @@ Kind = Literal[
     "slatf2-unicycle-imm",
     "ekf-slat-imm",
     "ekf-slat-unicycle-imm",
+    "slatf-shared",
 ]
 #: In the order of the enumeration in C++.
 KINDS: tuple[Kind, ...] = Kind.__args__  # type: ignore[attr-defined]
@@ -327,11 +328,11 @@ class Record:
         """Give the flags with which a target's program is compiled for this record.
 
         All filters in one program do not fit into the flash of the ATmega2560, nor the room that
-        others need into its RAM.
+        others need into its RAM. The one with one covariance is a program of its own anywhere.
         """
-        if target.machine != "avr":
-            return ()
         kinds = 1 << KINDS.index(self.kind)
+        if target.machine != "avr":
+            return (f"-DAUVEST_KINDS={kinds}",) if self.kind == "slatf-shared" else ()
         capacity = f"-DAUVEST_PARTICLES={max(1, self.particles)}", f"-DAUVEST_MASTERS={self.room}"
         return (f"-DAUVEST_KINDS={kinds}", *capacity)
 
@@ -382,16 +383,27 @@ class Record:
 def fields_of(kind: Kind, masters: int = 1) -> int:
     """Count the numbers of a particle with room for so many masters.
 
-    Log weight, pose (but for 1.0 with its covariance), masters: a belief, or of an Imm the combined
+    Log weight, pose (but for 1.0 with its covariance), masters: a belief (with one covariance for
+    all, its mean), or of an Imm the combined
     one, those of its three models and their probabilities. With joint Gaussians the covariances
     between slave and masters too.
     """
     pose = 3 if "unicycle" in kind else 2
+    if kind == "slatf-shared":
+        return 1 + pose + 6 * masters
     covariance = 0 if kind.startswith("slatf1") else pose * (pose + 1) // 2
     master = 27 * 4 + 3 if kind.endswith("imm") else 27
     joint = kind.startswith("slatf-joint")
     cross = sum(6 * (pose + 6 * n) for n in range(masters)) if joint else 0
     return 1 + pose + covariance + masters * master + cross
+
+
+def shared_record() -> Record:
+    """Give the paper's 200 echoes to N = 100 particles with one covariance, as they come.
+
+    With the gate and the recovery; the ATmega2560 has room for as many.
+    """
+    return Record("slatf-shared", PARTICLES, gate=13.8, kept=0.8)
 
 
 def all_records(*, chip: bool = False) -> dict[str, Record]:

@@ -9,7 +9,8 @@
 //             then per reading of the odometry: dt, the reading (2), the velocity change of each
 //             master that there is room for, the number of echoes, and of each: seconds since the
 //             reading began, range, bearing, master
-// Nobody is born again, and the covariance is that of the particles alone: the paper.
+// Nobody is born again, and the covariance is that of the particles alone: the paper. But a filter
+// with one covariance for all particles has its recovery.
 //
 //     trace:  statuses of reset and of each add_master, then per reading with echoes: all numbers
 //             of all particles, slave x and P, each master's x, P and, of an Imm, probabilities of
@@ -17,8 +18,8 @@
 //
 // Masters that are not there are zeros. AUVEST_PARTICLES and AUVEST_MASTERS are the capacity;
 // AUVEST_KINDS, if defined, the kinds that this program has (bit k: kind k), where they do not fit
-// together; AUVEST_LANES, if defined, the architecture of xsimd in whose lanes Slatf's particles
-// run.
+// together (all but kSlatfShared, which has a program of its own everywhere); AUVEST_LANES, if
+// defined, the architecture of xsimd in whose lanes Slatf's particles run.
 #pragma once
 
 #if defined(AUVEST_LANES)
@@ -36,6 +37,7 @@
 #include "auvest/slat/imm_slat.hpp"
 #include "auvest/slat/slatf.hpp"
 #include "auvest/slat/slatf_joint.hpp"
+#include "auvest/slat/slatf_shared.hpp"
 
 namespace auvest {
 namespace parity {
@@ -63,7 +65,8 @@ enum Kind : std::uint32_t {
   kSlatf1Imm,
   kSlatf2UnicycleImm,
   kEkfSlatImm,
-  kEkfSlatUnicycleImm
+  kEkfSlatUnicycleImm,
+  kSlatfShared
 };
 
 template <bool>
@@ -103,6 +106,7 @@ class Replay {
     particles<kSlatf2UnicycleImm, Second<Unicycle, ThreeModels>>();
     gaussian<kEkfSlatImm, EkfSlat<Compass, ThreeModels, kMasters>>();
     gaussian<kEkfSlatUnicycleImm, EkfSlat<Unicycle, ThreeModels, 1>>();
+    particles<kSlatfShared, SlatfShared<Compass, OneModel, kMasters>>();
   }
 
  private:
@@ -200,6 +204,11 @@ class Replay {
     params.birth_velocity_m_s = birth_velocity_m_s_;
     params.birth_acceleration_m_s2 = birth_acceleration_m_s2_;
   }
+  void fill(SlatfSharedParams<float>& params) const {
+    params.resample_below = resample_below_;
+    params.kept = kept_;
+    params.gate = gate_;
+  }
   void fill(SlatfJointParams<float>& params) const {
     params.recover_after = 0;
     params.resample_below = resample_below_;
@@ -263,6 +272,15 @@ class Replay {
       int cross = 0;  // numbers of the masters that there is room for
       for (int n = 0; n < room_; ++n) cross += 6 * (Motion::kStates + 6 * n);
       for (int k = 0; k < cross; ++k) write(*filter.set().at(i, Fields::kCrossField + k));
+    }
+  }
+
+  template <class Motion, class Master, int Masters, class Resampling, class L>
+  void show_particles(const SlatfShared<Motion, Master, Masters, Resampling, L>& filter) {
+    for (int i = 0; i < filter.particles(); ++i) {
+      write(filter.set().log_weights()[i]);
+      const int numbers = Motion::kStates + 6 * room_;
+      for (int field = 0; field < numbers; ++field) write(*filter.set().at(i, field));
     }
   }
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Literal
 
 from auvest.firmware import hil
+from firmware import chips
 
 ROOT = Path(__file__).resolve().parents[2]
 HERE = ROOT / "firmware/parity"
@@ -27,7 +28,7 @@ PACKAGES = {
     "g++": "g++",
     "clang++": "clang",
     "avr-g++": "gcc-avr avr-libc",
-    **hil.PACKAGES,
+    **chips.PACKAGES,
 }
 
 #: Simulated seconds that a replay on the ATmega2560 may take.
@@ -51,8 +52,9 @@ class Target:
         Command of the compiler.
     flags : tuple of str
         Its flags, but for the include paths.
-    machine : {"host", "avr", "mps2-an385", "mps2-an386"}
-        The computer itself, the simulated ATmega2560 board or a board of QEMU.
+    machine : {"host", "avr", "mps2-an385", "mps2-an386", "chip"}
+        The computer itself, the simulated ATmega2560 board, a board of QEMU with newlib's files, or
+        that of the chip of this name in :data:`firmware.chips.CHIPS`, without any.
     library : tuple of Path
         What the Arduino library compiles beside the headers.
     header : str
@@ -62,14 +64,14 @@ class Target:
     name: str
     compiler: str
     flags: tuple[str, ...]
-    machine: Literal["host", "avr", "mps2-an385", "mps2-an386"]
+    machine: Literal["host", "avr", "mps2-an385", "mps2-an386", "chip"]
     library: tuple[Path, ...] = ()
     header: str = "replay.hpp"
 
     @property
     def sources(self) -> tuple[Path, ...]:
         """What is compiled."""
-        if self.machine == "avr":
+        if self.machine in ("avr", "chip"):
             return (HERE / "avr.cpp", *self.library)
         if self.machine == "host":
             return (HERE / "host.cpp",)
@@ -87,6 +89,12 @@ class Target:
         own = [f'-DAUVEST_REPLAY="{self.header}"']
         if self.machine == "avr":
             own += [f"-I{ROOT / 'firmware/board'}", f"-I{ROOT / 'firmware/avr_std'}"]
+        if self.machine == "chip":
+            flags = (*self.flags, *extra, *own, f"-I{ROOT / 'cpp'}")
+            try:
+                return chips.build(chips.CHIPS[self.name], self.sources, program, flags)
+            except chips.ChipError as error:
+                raise ReplayError(str(error)) from None
         # Before the library's own path: what is in `extra` is found first.
         command = [self.compiler, *self.flags, *map(str, extra), *own, *INCLUDES]
         command += [*map(str, self.sources), "-o", str(program)]
@@ -111,6 +119,12 @@ class Target:
             If the program fails, crashes or does not end.
         """
         files = [str(record), str(trace)]
+        if self.machine == "chip":
+            try:
+                folder = trace.with_name(f"{trace.name}.run")
+                return chips.run(chips.CHIPS[self.name], program, record.read_bytes(), folder).trace
+            except chips.ChipError as error:
+                raise ReplayError(str(error)) from None
         if self.machine == "host":
             command = [str(program), *files]
         elif self.machine == "avr":
@@ -179,6 +193,16 @@ TARGETS = (
     _cortex("cortex-m4f"),
     _cortex("cortex-m3"),
 )
+
+
+def _chip(name: str) -> Target:
+    chip = chips.CHIPS[name]
+    return Target(name, chip.compiler, (*chips.SKETCH_FLAGS, *_WARNINGS), "chip")
+
+
+#: Chips with another compiler or other floats than those above: software on a Cortex-M0, the newer
+#: unit of a Cortex-M7, software and another C library on RISC-V. With the options of a sketch.
+CHIP_TARGETS = tuple(map(_chip, ("cortex-m0", "cortex-m7", "riscv32imc")))
 
 
 # ---- SLAT ----------------------------------------------------------------------------------------

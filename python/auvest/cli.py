@@ -26,6 +26,7 @@ COMMANDS: Mapping[tuple[str, ...], str] = {
         "Measure a filter with your models on the simulated MEGA2560: flash, RAM, stack, cycles."
     ),
     ("filters",): "List the filters: what each takes, and where it runs with the same bits.",
+    ("fit",): "Say which filters fit a chip with so much RAM and flash.",
     ("hil",): "Play a log to the filter on a chip, and compare every bit with the desk.",
     ("import",): "Turn a published recording into logs for 'auvest replay'.",
     ("library",): "Write the Arduino library: a zip for the IDE or PlatformIO.",

@@ -22,7 +22,7 @@ def page(root):
 
 @pytest.fixture(scope="module")
 def sketches(page):
-    """Return its sketches: own protocol, any filter, SLATF."""
+    """Return its sketches: own protocol, any filter, SLATF, the self-test."""
     return re.findall(r"^```cpp\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
 
 
@@ -96,3 +96,17 @@ def test_a_hundred_particles_fit(build_sketch, board, sketches):
     assert running.report.free_bytes >= 500
     assert len(lines) >= 2
     assert abs(float(lines[0]) - 5 * math.cos(0.5)) < 1, "a second at 5 m/s and 0.5 rad"
+
+
+def test_the_self_test_in_a_sketch(sketches, compiles, page):
+    """It compiles; that it notices a flag that was forgotten is in tests/parity."""
+    compiles(sketches[3])
+    assert "auvest::self_test()" in sketches[3]
+    told = page.partition("## The same bits")[2]
+    for place in (
+        "platform.local.txt",
+        "boards.local.txt",
+        "build_flags",
+        "target_compile_options",
+    ):
+        assert re.search(rf"{place}.*-ffp-contract=off|-ffp-contract=off.*{place}", told), place

@@ -3,6 +3,7 @@
 import subprocess
 
 import numpy as np
+import pytest
 
 pytest_plugins = ["board_support"]
 
@@ -148,3 +149,83 @@ def test_they_take_less_flash_and_no_more_cycles_than_those_of_the_toolchain(
     assert flash[0] < flash[1] - 150, flash
     # The root starts as a quotient, which costs some cycles.
     assert (cycles[0] < np.array([0.9, 0.9, 0.95, 1.1]) * cycles[1]).all(), cycles
+
+
+# ---- The contract of avr_float.S -----------------------------------------------------------------
+
+ROUTINES = {"__addsf3": 2, "__subsf3": 1, "__mulsf3": 0, "__divsf3": 3, "sqrtf": 4}
+KEPT = [*range(2, 18), 28, 29]
+
+CALLS = """
+#include "board.hpp"
+
+extern "C" {
+uint8_t operands[8], seen[24];
+void probe();
+}
+
+int main() {
+  for (uint16_t count = COUNT; count > 0; --count) {
+    for (uint8_t i = 0; i < 8; ++i) operands[i] = board::read();
+    probe();
+    for (uint8_t i = 0; i < 24; ++i) board::write(seen[i]);
+  }
+  board::finish();
+}
+"""
+
+
+def probe_of(routine):
+    """Assembler that calls it with 0xa0 + n in each register n that a call leaves alone.
+
+    ``seen`` becomes the result, those registers, r1 and SREG, which had I set. The call is section
+    1, so that its stack is measured.
+    """
+    lines = [".global probe", "probe:", *(f"push r{n}" for n in KEPT)]
+    lines += [f"ldi r18, {0xA0 + n}\n mov r{n}, r18" for n in KEPT]
+    lines += [
+        f"lds r{22 + i}, operands + {i}\n lds r{18 + i}, operands + {4 + i}" for i in range(4)
+    ]
+    lines += ["sei", "ldi r26, 2", "out 0x1e, r26", f"call {routine}"]
+    lines += ["in r27, 0x3f", "cli", "ldi r26, 3", "out 0x1e, r26"]  # GPIOR0; SREG
+    lines += [f"sts seen + {i}, r{n}" for i, n in enumerate([22, 23, 24, 25, *KEPT, 1, 27])]
+    lines += [f"pop r{n}" for n in reversed(KEPT)]
+    return "\n".join(["#define __SFR_OFFSET 0", ".text", *lines, "ret", ""])
+
+
+@pytest.mark.parametrize("routine", ROUTINES)
+def test_a_call_changes_what_the_contract_says_and_takes_no_stack(
+    routine, compile_avr, run_board, root, tmp_path
+):
+    rng = np.random.default_rng(3)
+    signed = np.concatenate([SPECIAL, SPECIAL | 0x80000000])
+    special = np.stack(np.meshgrid(signed, signed), -1).reshape(-1, 2)
+    pairs = np.concatenate([rng.integers(0, 1 << 32, (2_000, 2)), special]).astype("<u4")
+    probe = tmp_path / "probe.S"
+    probe.write_text(probe_of(routine))
+    routines = root / "firmware/library/src/avr_float.S"
+    elf = compile_avr(CALLS, f"-DCOUNT={len(pairs)}", probe, routines)
+    run = run_board(elf, stream=pairs.tobytes())
+    seen = np.frombuffer(run.output, "u1").reshape(-1, 24)
+    a, b = pairs.view("<f4").T
+    with np.errstate(all="ignore"):
+        wanted = (a * b, a - b, a + b, a / b, np.sqrt(a))[ROUTINES[routine]]
+    result = np.ascontiguousarray(seen[:, :4]).view("<f4")[:, 0]
+    assert np.array_equal(result, wanted, equal_nan=True)
+    assert (seen[:, 4:22] == 0xA0 + np.array(KEPT)).all()
+    assert not seen[:, 22].any(), "r1 is zero"
+    assert (seen[:, 23] & 0x80).all(), "interrupts stay on"
+    assert run.report.sections[1].stack_bytes == 3, "the return address of a chip with 256 KB"
+
+
+def test_the_routines_can_be_left_out(compile_avr, root):
+    """Then nothing of the file is left, and avr-libc's routines, which are larger, are linked."""
+    routines = root / "firmware/library/src/avr_float.S"
+    made = {}
+    for name, flags in {"ours": (), "theirs": ("-DAUVEST_NO_AVR_FLOAT",)}.items():
+        elf = compile_avr(PROGRAM, "-DCOUNT=1UL", *flags, routines)
+        called = ["avr-nm", elf]
+        made[name] = subprocess.run(called, capture_output=True, text=True, check=True).stdout
+    assert "divide_special" in made["ours"]
+    assert "divide_special" not in made["theirs"]
+    assert "__divsf3" in made["theirs"]

@@ -2,6 +2,9 @@
 
 https://arduino.github.io/arduino-cli/latest/library-specification
 https://arduino.github.io/arduino-lint/latest/rules/library
+
+And what PlatformIO's schema asks of library.json, as its package manager checks it.
+https://docs.platformio.org/en/latest/manifests/library-json
 """
 
 import json
@@ -175,6 +178,86 @@ def test_library_json_agrees(properties, folder):
     assert [author["name"] for author in manifest["authors"]] == [properties["author"]]
     assert manifest["platforms"] == manifest["frameworks"] == properties["architectures"]
     assert manifest["license"].split(" AND ")[0] == "MIT"
+
+
+#: PlatformIO's rules for the fields that it knows: characters, and the pattern of a text or of each
+#: text of a list.
+MANIFEST = {
+    "name": (1, 100, r"[^:;/,@<>]+"),
+    "version": (1, 50, SEMVER),
+    "description": (1, 1000, r".+"),
+    "keywords": (1, 50, r"[a-z\d\-_+. ]+"),
+    "homepage": (1, 255, r"https?://[^\s/]+\.[a-z]+(/\S*)?"),
+    "license": (1, 255, r"\S+( (AND|OR|WITH) \S+)*"),
+    "frameworks": (1, 50, r"[a-z\d\-_]+|\*"),
+    "platforms": (1, 50, r"[a-z\d\-_]+|\*"),
+    "headers": (1, 255, r"[\w./-]+\.h(pp)?"),
+}
+AUTHOR = {
+    "name": (1, 50, r".+"),
+    "email": (1, 50, r"[^@\s]+@[^@\s]+"),
+    "url": (1, 255, r"https?://\S+"),
+}
+#: Of the SPDX list, those that the library has.
+SPDX = {"MIT", "MPL-2.0", "BSD-3-Clause", "Apache-2.0"}
+
+
+def faults(manifest):
+    """Name the fields that break a rule; those that PlatformIO does not know are misspelt."""
+
+    def wrong(rule, value):
+        least, most, pattern = rule
+        texts = value if isinstance(value, list) else [value]
+        return not texts or any(
+            not isinstance(text, str)
+            or not least <= len(text) <= most
+            or not re.fullmatch(pattern, text)
+            for text in texts
+        )
+
+    found = [name for name in ("name", "version") if name not in manifest]
+    for name, value in manifest.items():
+        if name == "authors":
+            for author in value:
+                known = {**AUTHOR, "maintainer": None}
+                found += [f"authors.{key}" for key in author if key not in known]
+                found += [
+                    f"authors.{key}"
+                    for key, rule in AUTHOR.items()
+                    if (key in author or key == "name") and wrong(rule, author.get(key))
+                ]
+                if not isinstance(author.get("maintainer", False), bool):
+                    found.append("authors.maintainer")
+        elif name not in MANIFEST or wrong(MANIFEST[name], value):
+            found.append(name)
+    if not set(re.split(r" (?:AND|OR|WITH) ", manifest.get("license", "MIT"))) <= SPDX:
+        found.append("license")
+    return found
+
+
+def test_library_json_keeps_the_schema(folder):
+    assert faults(json.loads((folder / "library.json").read_text())) == []
+
+
+@pytest.mark.parametrize(
+    ("edit", "named"),
+    [
+        ({"name": "auvest/filters"}, "name"),
+        ({"version": "0.1"}, "version"),
+        ({"keywords": ["Kalman filter"]}, "keywords"),
+        ({"keywords": []}, "keywords"),
+        ({"homepage": "auvest.org"}, "homepage"),
+        ({"license": "MIT, MPL-2.0"}, "license"),
+        ({"license": "MIT AND MPL2"}, "license"),
+        ({"platforms": "Atmel AVR"}, "platforms"),
+        ({"framework": "arduino"}, "framework"),
+        ({"authors": [{"maintainer": True}]}, "authors.name"),
+        ({"authors": [{"name": "x" * 51}]}, "authors.name"),
+    ],
+)
+def test_a_manifest_that_breaks_a_rule_is_noticed(folder, edit, named):
+    manifest = json.loads((folder / "library.json").read_text())
+    assert named in faults({**manifest, **edit})
 
 
 # ---- Structure -----------------------------------------------------------------------------------

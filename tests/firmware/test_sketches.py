@@ -1,5 +1,6 @@
 """The example sketches: they compile cleanly, run, and say what they should; memory is watched."""
 
+import os
 import re
 import shutil
 
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 
 from auvest import ConstantAcceleration, RangeBearing, Ukf
+from auvest.board import BoardError
 from auvest.firmware.sketch import UNO, SketchError
 from auvest.simulation import paper_aukf
 from auvest.simulation.tracking import Scenario, simulate
@@ -243,3 +245,42 @@ def test_globals_beyond_the_ram_are_refused(build_sketch):
     source = STACK % "Serial.println(big[analogRead(0)]);"
     with pytest.raises(SketchError, match=r"section `\.bss' is not within region"):
         build_sketch(source.replace("void setup", "volatile uint8_t big[8192];\nvoid setup"))
+
+
+# ---- The watchdog --------------------------------------------------------------------------------
+
+GUARDED = ["beacon_navigation", "mission", "power_cuts", "slave_tracking", "tracking_loop"]
+slow = pytest.mark.skipif(
+    "AUVEST_SLOW_TESTS" not in os.environ, reason="AUVEST_SLOW_TESTS is not set"
+)
+
+
+@pytest.mark.parametrize("name", GUARDED)
+def test_the_watchdog_guards_the_loop(name, root):
+    """First in setup(), once in loop(), and never in an interrupt. What it does: below, if slow."""
+    text = (root / EXAMPLES / name / f"{name}.ino").read_text()
+    assert text.count("void setup() {\n  wdt_enable(WDTO_2S);\n") == 1
+    assert text.count("void loop() {\n  wdt_reset();\n") == 1
+    assert not re.search(r"ISR\(", text)
+
+
+@slow
+@pytest.mark.parametrize("name", [name for name in GUARDED if name != "power_cuts"])
+def test_a_loop_that_hangs_is_ended_by_the_watchdog(name, build_edited, board):
+    """Two seconds after it was last fed; the loop hangs in its first pass."""
+    hang = ("  wdt_reset();\n\n", "  wdt_reset();\n  for (;;) {\n  }\n\n")
+    if name == "mission":  # which waits for the vehicle first
+        hang = ("    vehicle.announce();\n", "    for (;;) {\n    }\n")
+    elf = build_edited(name, [(f"{name}.ino", *hang)]).elf
+    bites = pytest.raises(BoardError, match="reset by the watchdog")
+    with bites as error, board(elf, for_s=4.0) as running:
+        running.run()
+    at_s = error.value.report.cycles / error.value.report.frequency_hz
+    assert 2.0 < at_s < 2.0 * 1.1 + 0.2
+
+
+@slow
+@pytest.mark.parametrize("name", GUARDED)
+def test_a_sketch_whose_instruments_are_silent_is_not_ended(name, compiled, board):
+    with board(compiled(name).elf, for_s=6.0) as running:
+        assert running.run().reason == "elapsed"

@@ -1,9 +1,12 @@
 """The sketch slave_tracking on the simulated board: SLATF with the bits of the host, half asleep.
 
+As it comes, with 64 particles of one covariance and a gate, and as the paper has it, with 48.
+
 The world is the paper's scenario. What the sketch reported as measured is replayed on the host
 (firmware/parity), and everything that it computed must follow from it.
 """
 
+import os
 import re
 from dataclasses import dataclass, field
 from functools import reduce
@@ -16,15 +19,19 @@ from auvest import _core, telemetry
 from auvest.board import PinChange, Report, SerialLine
 from auvest.commands.capture import TRIGGER_PIN
 from auvest.firmware.sketch import SketchError
+from firmware.parity import slatf
 from firmware.parity.slatf import MASTER, READING, SLAVE, Record, World, paper_world
-from firmware.parity.targets import SLATF_TARGETS
+from firmware.parity.targets import AVR_PARTICLES, SLATF_TARGETS
 
 pytest_plugins = ["board_support"]
 
 TICKS_PER_S = 250_000
-PARTICLES = 48
+PARTICLES = 64
 SOUND_M_S = 1500.0
 HOST = SLATF_TARGETS[0]
+#: Filters that the sketch may have, and of those on the host.
+SHARED, PAPER = "slatf-shared", ("slatf2", "slatf1")
+KINDS = sum(1 << slatf.KINDS.index(kind) for kind in (SHARED, *PAPER))
 
 #: Column of the sketch, and the way to it in a row of the host's trace.
 ESTIMATES = {
@@ -103,14 +110,23 @@ def play(board):
     return play
 
 
+@pytest.fixture(scope="module")
+def sketch(build_edited):
+    """Return the sketch as it comes, compiled."""
+    return build_edited("slave_tracking").elf
+
+
 @pytest.fixture(scope="session")
 def on_the_host(tmp_path_factory):
     """Return a function that replays on the host what a run has measured."""
     folder = tmp_path_factory.mktemp("host")
-    program = HOST.build(folder / "replay")
+    program = HOST.build(folder / "replay", f"-DAUVEST_KINDS={KINDS}")
 
-    def on_the_host(run, kind, turn_from_s=240):
-        record = Record(kind, PARTICLES, measured_world(run, turn_from_s))
+    def on_the_host(run, kind=SHARED, turn_from_s=240):
+        world = measured_world(run, turn_from_s)
+        paper = kind in PAPER
+        guards = {} if paper else {"gate": 13.8, "kept": 0.8}
+        record = Record(kind, AVR_PARTICLES if paper else PARTICLES, world, **guards)
         (folder / "record").write_bytes(record.to_bytes())
         trace = HOST.replay(program, folder / "record", folder / "trace", None)
         return record.trace_of(trace)
@@ -161,14 +177,27 @@ def assert_same_bits(run, trace):
         assert row["status"] == wanted["status"] == 0
 
 
-@pytest.mark.parametrize("kind", ["slatf2", "slatf1"])
-def test_a_minute_with_the_bits_of_the_host(kind, build_edited, play, on_the_host):
-    filter_ = (  # as the sketch has it: the chip has no room for more
-        f"auvest::{kind.capitalize()}<Motion, Master, 1, auvest::SystematicResampling, "
-        "auvest::OneLane<float>, auvest::NoSafeguards>"
+def kinds():
+    yield from (SHARED, "slatf2")
+    slow = "AUVEST_SLOW_TESTS" in os.environ
+    yield pytest.param(
+        "slatf1", marks=pytest.mark.skipif(not slow, reason="AUVEST_SLOW_TESTS is not set")
     )
-    samples = 61 if kind == "slatf2" else 20
-    run = play(build_edited("slave_tracking", Filter=filter_).elf, samples)
+
+
+@pytest.mark.parametrize("kind", list(kinds()))
+def test_a_minute_with_the_bits_of_the_host(kind, sketch, build_edited, play, on_the_host):
+    particles, elf = PARTICLES, sketch
+    if kind in PAPER:  # with as many as the chip has room for, and nothing that guards it
+        particles = AVR_PARTICLES
+        filter_ = (
+            f"auvest::{kind.capitalize()}<Motion, Master, 1, auvest::SystematicResampling, "
+            "auvest::OneLane<float>, auvest::NoSafeguards>"
+        )
+        settings = {"Filter": filter_, "kParticles": particles, "kGate": 0, "kStackReserve": 1280}
+        elf = build_edited("slave_tracking", **settings).elf
+    samples = 61 if kind == SHARED else 16
+    run = play(elf, samples)
     assert_same_bits(run, on_the_host(run, kind))
     assert np.isfinite(run.column("range_m")).sum() == samples // 2
     assert run.column("resamplings")[-1] > 0
@@ -181,14 +210,15 @@ def test_a_minute_with_the_bits_of_the_host(kind, build_edited, play, on_the_hos
     awake = run.column("awake_us")[1:]
     period = awake[: len(awake) // 2 * 2].reshape(-1, 2).sum(axis=1) * 1e-6
     print(
-        f"{kind}, N = {PARTICLES}: awake {run.report.awake_share:.1%} simulated, at most "
+        f"{kind}, N = {particles}: awake {run.report.awake_share:.1%} simulated, at most "
         f"{period.max():.2f} s of 2 s; stack {run.report.stack_bytes} B, "
         f"never used {run.report.free_bytes} B"
     )
     assert period.max() < 1
     assert run.report.awake_share < 0.5
     assert run.report.serial_overruns == 0
-    if kind == "slatf2":
+    if kind == SHARED:
+        assert run.report.free_bytes >= 500
         (remark,) = (text for text in run.comments if "RAM" in text)
         assert int(re.search(r"\d+", remark)[0]) == run.report.free_bytes
 
@@ -227,7 +257,7 @@ def test_what_does_not_come_is_missed_and_nothing_else(build_edited, play, on_th
         return (disturbed(motion) if sample % 2 else motion)(sample)
 
     run = play(elf, 32, motion_, disturbed(echo))
-    assert_same_bits(run, on_the_host(run, "slatf2", turn_from_s=6))
+    assert_same_bits(run, on_the_host(run, turn_from_s=6))
     missed, refused = run.column("missed"), run.column("refused")
     for sample, (_, _, lines) in at.items():
         measured = "range_m" if sample % 2 == 0 else "speed_m_s"
@@ -242,7 +272,7 @@ def test_what_does_not_come_is_missed_and_nothing_else(build_edited, play, on_th
 IMPLAUSIBLE, IMPOSSIBLE_RANGE = 14, 11  # of Status in auvest/status.hpp
 
 
-def test_what_cannot_be_is_named_and_not_taken(build_edited, play, on_the_host):
+def test_what_cannot_be_is_named_and_not_taken(sketch, play, on_the_host):
     """Beyond a limit of the value or of its change: counted, and as if it had not come."""
     range_m = float(paper_world().readings["z"][3][0])
     readings = {3: (25.0, 0.5), 5: (5.0, 30.0), 7: (-21.0, 0.5)}
@@ -259,7 +289,7 @@ def test_what_cannot_be_is_named_and_not_taken(build_edited, play, on_the_host):
             return echo(sample)
         return [(0.4, telemetry.answer(sample, *echoes[sample]))]
 
-    run = play(build_edited("slave_tracking").elf, 12, motion_, echo_)
+    run = play(sketch, 12, motion_, echo_)
     wrong = [3, 4, 5, 6, 7, 8]
     assert [row["sample"] for row in run.rows if row["status"]] == wrong
     assert run.column("implausible").tolist() == [0, 0, 1, 2, 3, 4, 5, 6, 6, 6, 6, 6]
@@ -270,17 +300,42 @@ def test_what_cannot_be_is_named_and_not_taken(build_edited, play, on_the_host):
         assert np.isnan(run.rows[sample - 1]["range_m" if sample % 2 == 0 else "speed_m_s"])
     heard = [row["sample"] for row in run.rows if np.isfinite(row["range_m"])]
     assert heard == [2, 10, 12]
-    assert_same_bits(run, on_the_host(run, "slatf2"))
+    assert_same_bits(run, on_the_host(run))
 
 
 def test_late_samples_cover_what_really_passed(build_edited, play, on_the_host):
-    """Three readings a second are too many for 48 particles: said so, and still the host's bits."""
+    """Three readings a second are too many for them: said so, and still the host's bits."""
     run = play(build_edited("slave_tracking", kPeriod="0.3f").elf, 16)
-    assert_same_bits(run, on_the_host(run, "slatf2"))
+    assert_same_bits(run, on_the_host(run))
     assert run.column("late")[-1] > 3
     assert np.abs(np.diff(run.column("time_s")) - run.column("dt_s")[1:]).max() < 1e-5
 
 
 def test_more_particles_do_not_compile(build_edited):
     with pytest.raises(SketchError, match="less than kStackReserve bytes of RAM to the stack"):
-        build_edited("slave_tracking", kParticles="64")
+        build_edited("slave_tracking", kParticles="160")
+
+
+def test_a_gate_with_a_way_back(sketch, play, on_the_host):
+    """Echoes far off the estimate are refused and named; six that agree are a master reborn.
+
+    From sample 6 on the sonar hears the master 60 m further away, as if it had moved in silence.
+    """
+
+    def echo_(sample):
+        range_m, bearing = paper_world().readings["z"][sample - 1]
+        range_m += 60.0 if sample >= 6 else 0.0
+        return [(0.45, telemetry.answer(sample, range_m, bearing))]
+
+    run = play(sketch, 20, motion, echo_)
+    pinged = [row for row in run.rows if row["sample"] % 2 == 0]
+    assert [row["gated"] for row in pinged] == [0, 0, 1, 2, 3, 4, 5, 6, 6, 6]
+    assert [row["rebirths"] for row in pinged] == [0] * 7 + [1] * 3
+    named = [IMPLAUSIBLE if 6 <= row["sample"] <= 16 else 0 for row in pinged]
+    assert [row["status"] for row in pinged] == named
+    assert not run.column("implausible").any()
+    # The master is where it is heard, and the slave has learnt nothing from what was refused.
+    trace = on_the_host(run)
+    for row, wanted in zip(pinged, trace, strict=True):
+        assert row["master_x_m"] == float(wanted["masters"][0]["x"][0].view(np.float32))
+        assert row["x_m"] == float(wanted["slave_x"][0].view(np.float32))

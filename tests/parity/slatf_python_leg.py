@@ -54,6 +54,10 @@ def _filter(record: Record, lanes: str) -> SlatFilter:
         return EkfSlat(*start, **models)
     particles = {"particles": record.particles, "seed": record.seed}
     particles |= {"resample_below": record.resample_below}
+    if record.kind == "slatf-shared":
+        del models["recover_after"]
+        shared = {"covariance": "shared", "kept": record.kept, "max_masters": record.room}
+        return SlatfJoint(*start, **models, **particles, **shared)
     if record.kind.startswith("slatf-joint"):
         return SlatfJoint(*start, **models, **particles, kept=record.kept, max_masters=record.room)
     return Slatf(

@@ -6,6 +6,7 @@ filter never keeps one, and where a measurement is missing the trace has the one
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,10 @@ import pytest
 
 from auvest import SelfTestPart, Status
 from auvest.firmware.hil import ulps
+from firmware import chips
+from firmware.chips import CHIPS
 from firmware.parity import golden
-from firmware.parity.targets import TARGETS
+from firmware.parity.targets import CHIP_TARGETS, TARGETS
 from tests.parity.comparison import differing_bits, first_difference
 from tests.parity.records import REFERENCED, SELF_TEST, TRACE, all_records, bytes_of, trace_of
 
@@ -22,6 +25,11 @@ CONTROLS = Path(__file__).parent / "controls"
 RECORDS = all_records()
 BY_NAME = {record.name: record for record in RECORDS}
 TARGET = {target.name: target for target in TARGETS}
+SLOW = pytest.mark.skipif(
+    "AUVEST_SLOW_TESTS" not in os.environ, reason="AUVEST_SLOW_TESTS is not set"
+)
+#: With AUVEST_SLOW_TESTS each record runs on each of the chips of QEMU; without, this one on this.
+SHORT = ("riscv32imc", "gaps")
 
 #: avr-libc's own division rounds subnormal quotients down; this record lives of them.
 SUBNORMAL_QUOTIENTS = "subnormal-quotients"
@@ -36,6 +44,10 @@ def pairs():
             if (record.name, target.name) == (SUBNORMAL_QUOTIENTS, "atmega2560-O2"):
                 continue  # its own test, below
             yield pytest.param(record, target, id=f"{target.name}-{record.name}")
+    for target in CHIP_TARGETS:
+        for record in RECORDS:
+            marks = () if (target.name, record.name) == SHORT else SLOW
+            yield pytest.param(record, target, id=f"{target.name}-{record.name}", marks=marks)
 
 
 @pytest.mark.parametrize(("record", "target"), list(pairs()))
@@ -61,6 +73,38 @@ def test_the_one_known_disagreement_is_still_there(replay, expected):
 @pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.name)
 def test_the_self_test_passes_on_every_target(target, replay):
     assert self_test_of(replay(target, SELF_TEST)) == (SelfTestPart.none, 0)
+
+
+#: The self-test alone, a small program; its golden trace is a record of the AUKF.
+SELF_TEST_ALONE = """
+#include "auvest/self_test.hpp"
+#include "board.hpp"
+
+int main() {
+  const auvest::SelfTestResult result = auvest::self_test();
+  board::write(static_cast<std::uint8_t>(result.failed));
+  board::write(result.index);
+  board::finish();
+}
+"""
+
+
+@pytest.mark.parametrize("name", [target.name for target in CHIP_TARGETS])
+def test_the_self_test_passes_on_every_chip(name, tmp_path):
+    source = tmp_path / "self_test.cpp"
+    source.write_text(SELF_TEST_ALONE, encoding="utf-8")
+    program = chips.build(CHIPS[name], [source], tmp_path / "self_test.elf")
+    assert chips.run(CHIPS[name], program, b"", tmp_path).trace == bytes([SelfTestPart.none, 0])
+
+
+def test_the_self_test_notices_fused_products_on_a_cortex_m7(tmp_path):
+    """As a core of Arduino compiles that does not pass -ffp-contract=off."""
+    source = tmp_path / "self_test.cpp"
+    source.write_text(SELF_TEST_ALONE, encoding="utf-8")
+    flags = (*chips.SKETCH_FLAGS, "-ffp-contract=fast")
+    program = chips.build(CHIPS["cortex-m7"], [source], tmp_path / "self_test.elf", flags)
+    failed, _ = chips.run(CHIPS["cortex-m7"], program, b"", tmp_path).trace
+    assert SelfTestPart(failed) == SelfTestPart.contraction
 
 
 def self_test_of(trace):

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from auvest import Decision, Status
-from firmware.parity.targets import TARGETS
+from firmware.parity.targets import CHIP_TARGETS, TARGETS
 from tests.parity.comparison import differing_bits, first_difference
 from tests.parity.robust_records import all_records
 
@@ -21,8 +22,16 @@ def robust_expected():
     return {record.name: record.replay_in_python() for record in RECORDS}
 
 
+def targets():
+    yield from (pytest.param(target, id=target.name) for target in TARGETS)
+    slow = pytest.mark.skipif(
+        "AUVEST_SLOW_TESTS" not in os.environ, reason="AUVEST_SLOW_TESTS is not set"
+    )
+    yield from (pytest.param(target, id=target.name, marks=slow) for target in CHIP_TARGETS)
+
+
 @pytest.mark.parametrize("record", RECORDS, ids=lambda record: record.name)
-@pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.name)
+@pytest.mark.parametrize("target", list(targets()))
 def test_every_target_gives_the_bits_of_python(record, target, replay, robust_expected):
     found = record.trace_of(replay(target, record.to_bytes()))
     wanted = robust_expected[record.name]

@@ -115,6 +115,8 @@ def test_wheel_ships_what_firmware_is_made_from(wheel, root):
                 path.read_bytes()
             )
     assert shipped["auvest/firmware/LICENSE"] == (root / "LICENSE").read_bytes()
+    budgets = (root / "firmware" / "budgets.csv").read_bytes()  # what `auvest fit` says
+    assert shipped["auvest/firmware/budgets.csv"] == budgets
 
 
 @pytest.mark.skipif("AUVEST_SLOW_TESTS" not in os.environ, reason="AUVEST_SLOW_TESTS is not set")

@@ -1,4 +1,5 @@
-#if defined(__AVR__) && defined(__AVR_HAVE_MUL__) && defined(__AVR_HAVE_JMP_CALL__)
+#if defined(__AVR__) && defined(__AVR_HAVE_MUL__) && defined(__AVR_HAVE_JMP_CALL__) && \
+    !defined(AUVEST_NO_AVR_FLOAT)
 
 ; Float arithmetic for AVR chips with a hardware multiplier: A + B, A - B, A * B, A / B and the root
 ; of A, rounded as IEEE 754 says, to nearest and ties to even, with signed zeros, subnormal numbers,
@@ -6,8 +7,26 @@
 ; but for the root, slower, and which round subnormal quotients down. All share one end, and all but
 ; the sum one beginning.
 ;
-; Arguments and results as avr-gcc has them: A in r25:r22, B in r21:r18, result in r25:r22; r0,
-; r18-r27, r30, r31 and T may change, r1 is zero.
+; With AUVEST_NO_AVR_FLOAT defined for the assembler, nothing is left of this file and avr-libc's are
+; taken: where another library has routines of the same names.
+;
+; The contract, that of avr-gcc's calls:
+;
+;   routine        computes          A         B         result
+;   __addsf3       A + B             r25:r22   r21:r18   r25:r22
+;   __subsf3       A - B             r25:r22   r21:r18   r25:r22
+;   __mulsf3       A * B             r25:r22   r21:r18   r25:r22
+;   __divsf3       A / B             r25:r22   r21:r18   r25:r22
+;   sqrt, sqrtf    the root of A     r25:r22   -         r25:r22
+;
+;   register                         who
+;   r18-r27, r30, r31, r0            the routine may change them
+;   r1                               zero at the call and at the return; other values between: an
+;                                    interrupt saves and clears it, as avr-gcc's do
+;   r2-r17, r28, r29                 as they were
+;   SREG                             the routine may change T and the flags of arithmetic, not I
+;   stack                            the return address only: nothing is pushed, nothing called
+;   memory                           neither read nor written: safe in an interrupt
 
         .text                           ; before .text.*, where gcc puts what is hot
 

@@ -17,6 +17,8 @@
 // deadline, the sample is taken at once and counted as late; the prediction covers the time that
 // really passed.
 //
+// A loop that hangs for two seconds is ended by the watchdog, and the board starts anew.
+//
 // Text, 115200 baud: $NAV,...*hhhhhhhh; a line at the start names its columns, and `auvest capture`
 // makes a table and a figure of it. Now and then a comment says how much RAM was never used.
 #include <Arduino.h>
@@ -24,6 +26,7 @@
 #include <auvest_board.h>
 #include <auvest_boot.h>
 #include <auvest_wake_timer.h>
+#include <avr/wdt.h>
 
 #include "config.h"
 #include "instruments.h"
@@ -131,6 +134,7 @@ AUVEST_OUTLINE void report() {
 }
 
 void setup() {
+  wdt_enable(WDTO_2S);
   Serial.begin(auvest_board::kBaud);
   auvest_board::announce_boot();
   Telemetry::introduce();
@@ -141,13 +145,14 @@ void setup() {
   if (status != auvest::Status::kOk) {
     Serial.print(F("# the filter does not start, status "));  // its text would take 300 B of RAM
     Serial.println(static_cast<uint8_t>(status));
-    for (;;) {
-    }
+    for (;;) wdt_reset();
   }
   wake_timer::begin();
 }
 
 void loop() {
+  wdt_reset();
+
   // The moment of this sample.
   instruments.listen(deadline, false, telemetry.line());
   const uint32_t now = wake_timer::now();

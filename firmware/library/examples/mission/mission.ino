@@ -14,6 +14,8 @@
 // the sample is taken at once and counted as late; the prediction covers the time that really
 // passed.
 //
+// A loop that hangs for two seconds is ended by the watchdog, and the board starts anew.
+//
 // Text, 115200 baud: $MISSION,...*hhhhhhhh; a line at the start names its columns. Now and then a
 // comment says how much RAM was never used.
 #include <Arduino.h>
@@ -21,6 +23,7 @@
 #include <auvest_board.h>
 #include <auvest_boot.h>
 #include <auvest_wake_timer.h>
+#include <avr/wdt.h>
 
 #include "config.h"
 #include "mission_line.h"
@@ -113,11 +116,13 @@ AUVEST_OUTLINE void report() {
 }
 
 void setup() {
+  wdt_enable(WDTO_2S);
   Serial.begin(auvest_board::kBaud);
   auvest_board::announce_boot();
   Telemetry::introduce();
   wake_timer::begin();
   while (!vehicle.started()) {
+    wdt_reset();
     vehicle.announce();
     moment += kSecond;
     vehicle.await([] { return vehicle.started(); }, moment, telemetry.line());
@@ -126,14 +131,15 @@ void setup() {
   if (status != auvest::Status::kOk) {
     Serial.print(F("# the pilot does not start: "));
     Serial.println(auvest::describe(status));
-    for (;;) {
-    }
+    for (;;) wdt_reset();
   }
   moment = wake_timer::now();
   deadline = moment + kTicks;
 }
 
 void loop() {
+  wdt_reset();
+
   // The moment of this sample.
   vehicle.await([] { return false; }, deadline, telemetry.line());
   const uint32_t now = wake_timer::now();

@@ -1,5 +1,5 @@
 // A slave that lost communication keeps track of itself and of its master: SLATF (Lu, Chen, Liu,
-// Ma, He 2020) on an Arduino MEGA2560.
+// Ma, He 2020) on an Arduino MEGA2560, with joint particles that share one covariance.
 //
 // Each second: the timer wakes the chip, it asks for speed and heading, all particles are moved.
 // Every other second it pings the master: the sonar is triggered at the moment of the sample, the
@@ -19,7 +19,11 @@
 // the sample is taken at once and counted as late; the prediction covers the time that really
 // passed. A reading that does not come is replaced by the last one, an echo by nothing; both are
 // counted as missed. So is what cannot be (status kImpossibleRange or kImplausible), which is
-// counted as implausible.
+// counted as implausible. An echo beyond the filter's gate says nothing, has the status kImplausible
+// and is counted as gated; where several of them agree, it is the master that was lost, and it is
+// born again where they place it (rebirths).
+//
+// A loop that hangs for two seconds is ended by the watchdog, and the board starts anew.
 //
 // Text, 115200 baud: $SLAVE,...*hhhhhhhh; a line at the start names its columns. The estimates are
 // computed after pings only. Now and then a comment says how much RAM was never used.
@@ -29,6 +33,7 @@
 #include <auvest_boot.h>
 #include <auvest_instruments.h>
 #include <auvest_wake_timer.h>
+#include <avr/wdt.h>
 
 #include "config.h"
 #include "master_plan.h"
@@ -131,7 +136,9 @@ AUVEST_OUTLINE bool admits(const auvest::Vector<float, 2>& z) {
 AUVEST_OUTLINE void update() {
   range.take(sample.z(0));
   const auvest::Echo<float> echo = {sample.z, 0};
+  const uint32_t gated = Refusals::gated(filter.safeguards());
   note(filter.update(&echo, 1, sonar, random_numbers));
+  if (Refusals::gated(filter.safeguards()) != gated) note(auvest::Status::kImplausible);
 }
 
 AUVEST_OUTLINE void report() {
@@ -152,6 +159,7 @@ void pulse() {
 }
 
 void setup() {
+  wdt_enable(WDTO_2S);
   Serial.begin(auvest_board::kBaud);
   pinMode(kTriggerPin, OUTPUT);
   digitalWrite(kTriggerPin, LOW);
@@ -163,13 +171,14 @@ void setup() {
   if (status != auvest::Status::kOk) {
     Serial.print(F("# the filter does not start, status "));  // its text would take 300 B of RAM
     Serial.println(static_cast<uint8_t>(status));
-    for (;;) {
-    }
+    for (;;) wdt_reset();
   }
   wake_timer::begin();
 }
 
 void loop() {
+  wdt_reset();
+
   // The moment of this sample.
   wake_timer::sleep_until_moment(deadline);
   const uint32_t now = wake_timer::now();

@@ -30,9 +30,23 @@ struct Sample {
   uint32_t awake = 0;                           ///< ticks since the line before
 };
 
+/// Echoes beyond the gate and masters born again since the start; none without Safeguards.
+struct Refusals {
+  template <class Guard>
+  static uint32_t gated(const Guard& guard) {
+    return static_cast<uint32_t>(guard.report().refused);
+  }
+  template <class Guard>
+  static uint32_t rebirths(const Guard& guard) {
+    return static_cast<uint32_t>(guard.report().rebirths);
+  }
+  static uint32_t gated(const auvest::NoSafeguards&) { return 0; }
+  static uint32_t rebirths(const auvest::NoSafeguards&) { return 0; }
+};
+
 class Telemetry {
   static constexpr size_t kNumbers = 18;
-  static constexpr size_t kCapacity = 88 + kNumbers * (kExactText ? 9 : 10);
+  static constexpr size_t kCapacity = 104 + kNumbers * (kExactText ? 9 : 10);
 
  public:
   using Line = auvest_board::SampleLine<kCapacity, kExactText, 3>;
@@ -45,7 +59,7 @@ class Telemetry {
         F(",SLAVE,sample#,time_s,dt_s,speed_m_s,heading_rad,range_m,bearing_rad,"
           "x_m,y_m,P00_m2,P10_m2,P11_m2,master_x_m,master_y_m,master_vx_m_s,master_vy_m_s,"
           "master_P00_m2,master_P10_m2,master_P11_m2,n_eff,resamplings#,"
-          "status#,missed#,refused#,implausible#,"
+          "status#,missed#,refused#,implausible#,gated#,rebirths#,"
           "late#,awake_us#"));
     line.finish();
     Serial.flush();
@@ -71,6 +85,8 @@ class Telemetry {
     line_.field(sample.missed);
     line_.field(sample.refused);
     line_.field(sample.implausible);
+    line_.field(Refusals::gated(filter.safeguards()));
+    line_.field(Refusals::rebirths(filter.safeguards()));
     line_.field(sample.late);
     line_.field(sample.awake * auvest_board::kMicrosecondsPerTick);
     line_.finish();

@@ -17,6 +17,8 @@
 // both beyond the gate of the filter, kImplausible. All are predicted
 // only.
 //
+// A loop that hangs for two seconds is ended by the watchdog, and the board starts anew.
+//
 // Text, 115200 baud. Each sample gives one line, $AUV,...*hhhhhhhh; a line at the start names its
 // columns. `auvest capture` makes a table and a figure of it; config.h has the other choices. A
 // line goes out at once if it is through before the next deadline, else behind the next request:
@@ -27,6 +29,7 @@
 #include <auvest_board.h>
 #include <auvest_boot.h>
 #include <auvest_wake_timer.h>
+#include <avr/wdt.h>
 
 #include "config.h"
 #include "sonar.h"
@@ -116,6 +119,7 @@ void update() {
 }
 
 void setup() {
+  wdt_enable(WDTO_2S);
   Serial.begin(auvest_board::kBaud);
   sonar.begin();
   auvest_board::announce_boot();
@@ -124,14 +128,15 @@ void setup() {
   if (status != auvest::Status::kOk) {
     Serial.print(F("# "));
     Serial.println(auvest::describe(status));
-    for (;;) {
-    }
+    for (;;) wdt_reset();
   }
   wake_timer::begin();
   deadline = moment + wake_timer::to_ticks(filter.interval());
 }
 
 void loop() {
+  wdt_reset();
+
   // The moment of this sample.
   wake_timer::sleep_until_moment(deadline);
   const uint32_t now = wake_timer::now();
