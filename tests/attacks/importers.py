@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import ClassVar
 
 from auvest.logs import LogError, LogFolder
-from auvest.logs.importers import IMPORTERS
+from auvest.importers.sets import IMPORTERS
 from tests.attacks.damage import damaged, steps
 from tests.attacks.frame import Case, Failed, main
 from tests.attacks.logs import table

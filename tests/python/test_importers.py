@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from auvest.logs import LogError, LogFolder
-from auvest.logs.importers import IMPORTERS
+from auvest.importers.sets import IMPORTERS
 
 
 def recording(folder: Path, files: dict[str, str]) -> Path:

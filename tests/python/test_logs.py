@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from auvest.logs import FILES, Column, CsvTable, LogError, LogFolder, Stream, merge, reader
-from auvest.logs.importers import IMPORTERS
+from auvest.importers.sets import IMPORTERS
 from auvest.logs.write import write_file
 
 
