@@ -16,9 +16,9 @@ from conftest import ROOT
 from typer.testing import CliRunner
 
 from auvest.cli import app
+from auvest.importers.sets import IMPORTERS
 from auvest.logs import LogError, LogFolder, reader
 from auvest.logs.findings import CAUSES, worst
-from auvest.importers.sets import IMPORTERS
 from auvest.logs.write import write_file
 from auvest.replay import Settings, find_settings, replay, settings_from
 from auvest.replay.checks import Checked, check, files

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from auvest.logs import LogError, LogFolder
 from auvest.importers.sets import IMPORTERS
+from auvest.logs import LogError, LogFolder
 
 
 def recording(folder: Path, files: dict[str, str]) -> Path:

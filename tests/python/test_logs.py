@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from auvest.logs import FILES, Column, CsvTable, LogError, LogFolder, Stream, merge, reader
 from auvest.importers.sets import IMPORTERS
+from auvest.logs import FILES, Column, CsvTable, LogError, LogFolder, Stream, merge, reader
 from auvest.logs.write import write_file
 
 
