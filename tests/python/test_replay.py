@@ -998,7 +998,7 @@ def test_import_command(tmp_path: Path) -> None:
     result = call("import", "ugps_pier59", source, tmp_path / "logs", "--json")
     assert result.exit_code == 0, result.output
     folders = [Path(path) for path in json.loads(result.stdout)["logs"]]
-    assert [folder.name for folder in folders] == ["ugps_pier59_1", "ugps_pier59_2"]
+    assert [folder.name for folder in folders] == ["ugps_1", "ugps_2"]
     np.testing.assert_allclose(
         LogFolder(folders[0])["fixes.csv"].whole(),
         [[0.0, 0, 5.0, math.atan2(4, 3)], [1.0, 0, 2.0, math.pi / 2]],

@@ -7,7 +7,7 @@ which columns of the log. docs/importers.md has the formats and the mapping.
 
 Data sets are goats14, hat_charles, labyrinth_uwb, mrclam6 and ugps_pier59 as the project's
 validation data have them, others of the same layout, and mrclam: the original text files of any
-UTIAS MR.CLAM set.
+UTIAS MR.CLAM set. Their logs are named by SOURCE.
 
 Examples
 --------
@@ -37,7 +37,7 @@ from auvest.importers import (
     read_mapping,
     recipe,
 )
-from auvest.importers.sets import IMPORTERS
+from auvest.importers.sets import IMPORTERS, layout_of
 
 
 def command(
@@ -80,6 +80,8 @@ def command(
             param_hint="FORMAT",
         )
     given = list(map(Path, words if kind is None else words[1:]))
+    if kind is None and not listed:
+        kind = layout_of(given[0])
     with terminal.usage_errors():
         if listed:
             found = listing(open_recording(given[0], kind), at or ())
@@ -93,7 +95,7 @@ def command(
 
 def _import_set(terminal: Terminal, kind: str, source: Path, output: Path, *, force: bool) -> None:
     with terminal.writing(output):
-        folders = IMPORTERS[kind](source, output, force=force)
+        folders = IMPORTERS[kind](source, output, force=force, note=terminal.warn)
     terminal.result_json(
         {"command": "import", "version": version(), "logs": [str(folder) for folder in folders]}
     )
