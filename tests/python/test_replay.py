@@ -36,6 +36,7 @@ from auvest import (
 )
 from auvest.cli import app
 from auvest.logs import FILES, LogError, LogFolder, reader
+from auvest.logs.layout import SPELLINGS
 from auvest.logs.write import write_file
 from auvest.models import ConstantAcceleration
 from auvest.replay import Settings, engine, find_settings, read_settings, replay, settings_from
@@ -911,11 +912,14 @@ def test_the_documented_layout_is_the_layout() -> None:
     for name, layouts in FILES.items():
         assert f"`{name}`" in page
         for layout in layouts:
-            header = ",".join(column.name for column in layout)
-            optional = header.rpartition(",")
-            assert f"`{header}`" in page or (
-                f"`{optional[0]}` and optionally `{optional[2]}`" in page
-            )
+            also = ", ".join(f"`{column.name}`" for column in layout.optional)
+            optionally = f" and optionally {also}" if also else ""
+            required = ",".join(column.name for column in layout.required)
+            assert f"`{required}`{optionally} |" in page, (name, layout)
+    for names, spellings in SPELLINGS.items():
+        for other in spellings:
+            pair = [", ".join(f"`{name}`" for name in one) for one in (names, other)]
+            assert f"| {pair[0]} | {pair[1]} |" in page
 
 
 # ---- The command ---------------------------------------------------------------------------------
