@@ -1,12 +1,12 @@
 """An MCAP file for Foxglove, in the JSON form of its schemas.
 
-======================  ======================  ====================================================
-``/auvest/pose``        foxglove.PoseInFrame    every estimate
-``/auvest/ellipse``     foxglove.SceneUpdate    the 3-sigma ellipse, once a second
-``/auvest/fix``         foxglove.LocationFix    every estimate on Earth, if it is known where (0, 0) is
-``/auvest/innovation``  auvest.Innovation       every measurement: innovation, sigma, NIS, weight, and
-                                                what became of it
-======================  ======================  ====================================================
+======================  ====================  ====================================================
+``/auvest/pose``        foxglove.PoseInFrame  every estimate
+``/auvest/ellipse``     foxglove.SceneUpdate  the 3-sigma ellipse, once a second
+``/auvest/fix``         foxglove.LocationFix  every estimate, if it is known where (0, 0) is
+``/auvest/innovation``  auvest.Innovation     every measurement: innovation, sigma, NIS, weight, and
+                                              what became of it
+======================  ====================  ====================================================
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ def export_foxglove(results: ReplayResults, folder: Path) -> dict[str, int]:
             text = json.dumps(message, allow_nan=False).encode()
             writer.add_message(channels[topic], row.time_ns, text, row.time_ns)
             counts[topic] += 1
-        writer.finish()
+        writer.finish()  # type: ignore[no-untyped-call]
     return dict(counts)
 
 

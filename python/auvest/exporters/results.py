@@ -61,7 +61,7 @@ class ReplayResults:
         """
         estimates, measurements = (
             self._rows(name)
-            for name in ("estimates", "measurements")  # type: ignore[arg-type]
+            for name in ("estimates", "measurements")
         )
         return heapq.merge(estimates, measurements, key=lambda row: row.time_ns)
 

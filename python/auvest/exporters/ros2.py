@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import shutil
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from auvest.exporters.foxglove import pose_of
 from auvest.exporters.results import ReplayResults
 from auvest.importers.recording import MissingPackage
 
 _ODOMETRY, _POSE = "nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseWithCovarianceStamped"
-_VERSION = 9  # of the bag's format: ROS 2 Jazzy, which Humble reads, too
+_VERSION: Literal[9] = 9  # of the bag's format: ROS 2 Jazzy, which Humble reads, too
 
 
 def export_ros2(results: ReplayResults, folder: Path) -> dict[str, int]:

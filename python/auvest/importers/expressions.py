@@ -47,6 +47,10 @@ class MappingError(ValueError):
     """A mapping says what cannot be done."""
 
 
+class NoSuchField(MappingError):
+    """It names a field that messages of a topic do not have."""
+
+
 #: Of other topics the message that is nearest in time.
 Beside: TypeAlias = Mapping[str, Message]
 Evaluate: TypeAlias = Callable[[Message, Beside], float | None]
@@ -147,7 +151,7 @@ def _field(name: str, missing: float | None) -> Evaluate:
         try:
             value = message.values[name]
         except KeyError:
-            raise MappingError(
+            raise NoSuchField(
                 f"{message.topic} has no field {name}; it has {', '.join(message.values)[:300]}"
             ) from None
         if value is None or value == missing:

@@ -15,6 +15,8 @@ A table per file of the log, or an array of tables if several topics make it::
 
     [beacons]
     rows = [{source = 0, x_m = 0.0, y_m = 0.0}]
+    beside = "fixes"                   # only if this file gets rows
+    unless = "leaders"                 # and not if this one does
 
 Columns are made by expressions (:mod:`auvest.importers.expressions`); ``time_s`` is the message's
 unless it is said. ``increments = {x_m, y_m, heading_rad}`` makes odometry of poses. A table with
@@ -26,14 +28,14 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from auvest._outputs import is_plain_file
 from auvest.importers.expressions import Expression, MappingError, expression
 from auvest.importers.recording import Message
-from auvest.logs.layout import FILES, Column
+from auvest.logs.layout import COLUMNS, FILES, Column, match
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -44,7 +46,7 @@ _RECIPES = Path(__file__).parent / "recipes"
 #: What ``increments`` make of poses.
 INCREMENTS = ("forward_m", "left_m", "turn_rad")
 _POSE = ("x_m", "y_m", "heading_rad")
-_OPTIONS = ("topic", "type", "recording", "when", "fresh", "increments", "rows")
+_OPTIONS = ("topic", "type", "recording", "when", "fresh", "increments", "rows", "beside", "unless")
 
 
 @dataclass(frozen=True)
@@ -71,6 +73,8 @@ class Table:
         x, y and heading, of which increments are made; empty if none are.
     rows : tuple of mapping
         Rows that do not come from messages.
+    beside, unless : str or None
+        A file without whose rows, and one with whose rows, these are needless.
     """
 
     file: str
@@ -83,6 +87,8 @@ class Table:
     values: Mapping[str, Expression] = field(default_factory=dict)
     pose: tuple[Expression, ...] = ()
     rows: tuple[Mapping[str, float], ...] = ()
+    beside: str | None = None
+    unless: str | None = None
 
     @property
     def topics(self) -> set[str]:
@@ -96,12 +102,17 @@ class Table:
 
 @dataclass(frozen=True)
 class LogMapping:
-    """A whole mapping."""
+    """A whole mapping.
+
+    ``lenient``: a field that messages do not have is a number that is missing; one that a user has
+    named is a mistake.
+    """
 
     name: str
     clock: str
     period_s: float | None
     tables: tuple[Table, ...]
+    lenient: bool = False
 
 
 def read_mapping(path: Path) -> LogMapping:
@@ -129,7 +140,7 @@ def read_mapping(path: Path) -> LogMapping:
 def recipe(format_name: str) -> LogMapping | None:
     """Give the mapping that comes with the package for a format; None if there is none."""
     path = _RECIPES / f"{format_name}.toml"
-    return read_mapping(path) if path.exists() else None
+    return replace(read_mapping(path), lenient=True) if path.exists() else None
 
 
 def _mapping(name: str, document: dict[str, Any]) -> LogMapping:
@@ -158,14 +169,19 @@ def _table(stem: str, given: dict[str, Any]) -> Table:
     options = {name: given.pop(name) for name in _OPTIONS if name in given}
     for name, kind in (
         ("topic", str), ("type", str), ("recording", str), ("when", dict), ("fresh", bool),
-        ("increments", dict), ("rows", list),
+        ("increments", dict), ("rows", list), ("beside", str),
+        ("unless", str),
     ):  # fmt: skip
         if name in options and not isinstance(options[name], kind):
             raise MappingError(f"{stem}: {name} is not what it must be")
     if "rows" in options:
-        if given or set(options) != {"rows"}:
+        if given or not set(options) <= {"rows", "beside", "unless"}:
             raise MappingError(f"{stem}: rows stand alone")
-        return _constant(stem, file, options["rows"])
+        beside, unless = (_file(stem, options.get(name)) for name in ("beside", "unless"))
+        constant = _constant(stem, file, options["rows"])
+        return replace(constant, beside=beside, unless=unless)
+    if "unless" in options or "beside" in options:
+        raise MappingError(f"{stem}: beside and unless are for rows")
     if ("topic" in options) == ("type" in options):
         raise MappingError(f"{stem}: needs a topic, or a type")
     pose: tuple[Expression, ...] = ()
@@ -176,6 +192,12 @@ def _table(stem: str, given: dict[str, Any]) -> Table:
     values = {name: expression(part, f"{stem}.{name}") for name, part in given.items()}
     names = {*values, "time_s", *(INCREMENTS if pose else ())}
     return Table(file, columns_of(file, names), values=values, pose=pose, **options)
+
+
+def _file(stem: str, name: str | None) -> str | None:
+    if name is not None and f"{name}.csv" not in FILES:
+        raise MappingError(f"{stem}: {name} is no file of a log")
+    return None if name is None else f"{name}.csv"
 
 
 def _constant(stem: str, file: str, rows: list[Any]) -> Table:
@@ -196,18 +218,18 @@ def _constant(stem: str, file: str, rows: list[Any]) -> Table:
 
 
 def columns_of(file: str, names: set[str]) -> tuple[Column, ...]:
-    """Columns of a file by their names, in the order of its layout.
+    """Columns of a file by their names, of either spelling, in the order of its layout.
 
     Raises
     ------
     MappingError
         If no layout of the file has just these.
     """
-    for layout in FILES[file]:
-        if {column.name for column in layout} == names:
-            return layout
-    expected = " or ".join(",".join(column.name for column in layout) for layout in FILES[file])
-    raise MappingError(f"{file} has the columns {expected}, not {','.join(sorted(names))}")
+    found = match(file, names)
+    if found is None or len(found.given) < len(names):
+        expected = " or ".join(map(str, FILES[file]))
+        raise MappingError(f"{file} has the columns {expected}, not {','.join(sorted(names))}")
+    return tuple(COLUMNS[name] for name in found.given)
 
 
 def _is(value: Any, wanted: Any) -> bool:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TextIO
 
 from auvest._outputs import NewFolder, OutputError
-from auvest.importers.expressions import WITHIN_S, MappingError, NotANumber, step
+from auvest.importers.expressions import WITHIN_S, MappingError, NoSuchField, NotANumber, step
 from auvest.importers.formats import open_recording
 from auvest.importers.mapping import INCREMENTS, LogMapping, Table
 from auvest.importers.recording import Message, Recording, RecordingError
@@ -61,11 +61,10 @@ def import_recording(
         notes = writing.notes()
         try:
             LogFolder(new.part)
-        except LogError as error:
-            if error.path != new.part:
-                raise
-            # Other recordings of the dive may bring what is missing.
-            notes.append(f"not yet a log that can be replayed: {error.args[0].split(': ', 1)[1]}")
+        except LogError as error:  # other recordings of the dive may bring what is missing
+            where, _, what = str(error).removeprefix(str(new.part)).partition(": ")
+            what = f"{where.strip('/')} {what}".strip()
+            notes.append(f"not yet a log that can be replayed: {what}")
         new.publish()
     return Imported(new.path, dict(writing.rows), notes)
 
@@ -110,13 +109,18 @@ class _Writing:
                 f"holds nothing for a log by {self._mapping.name}, which looks for {topics}"
                 + (f" ({why})" if why else ""),
             )
+        for table in self._mapping.tables:
+            alone = table.beside is not None and not self.rows[table.beside]
+            if alone or (table.unless is not None and self.rows[table.unless]):
+                self.rows[table.file] = 0
         for file in self._headers:
             if not self.rows[file]:
                 (self._folder / file).unlink()
 
     def notes(self) -> list[str]:
         """Say what was left out."""
-        empty = sorted(file for file in self._headers if not self.rows[file])
+        constant = {table.file for table in self._mapping.tables if table.rows}
+        empty = sorted(file for file in {*self._headers} - constant if not self.rows[file])
         return [
             *(f"nothing for {file}" for file in empty),
             *(f"left out: {count} {what}" for what, count in self._left_out.items()),
@@ -150,9 +154,10 @@ class _Writing:
             if message.topic in needed:
                 latest[message.topic] = message
             for source in sources:
+                source.require_one(recording, message)
                 if message.topic in source.others:
                     source.nearer(message)
-                if source.takes(message, recording.types.get(message.topic)):
+                if message.topic == source.topic:
                     source.wait(message, latest)
                 for ready, beside in source.ready(message):
                     self._row(recording, source, ready, beside)
@@ -173,6 +178,11 @@ class _Writing:
         try:
             values = {name: part.evaluate(message, beside) for name, part in table.values.items()}
             pose = [part.evaluate(message, beside) for part in table.pose]
+        except NoSuchField:
+            if not self._mapping.lenient:
+                raise
+            self._left_out[f"messages of {message.topic} without a field for {table.file}"] += 1
+            return
         except (NotANumber, OverflowError) as error:
             raise RecordingError(recording.path, message.where, str(error)) from None
         if "time_s" not in values:
@@ -222,6 +232,7 @@ class _Source:
 
     def __init__(self, table: Table) -> None:
         self.table = table
+        self.topic = table.topic
         self.others = table.topics
         self.waiting: deque[tuple[Message, dict[str, Message]]] = deque()
         self._before: Message | None = None
@@ -252,10 +263,17 @@ class _Source:
                 return
             yield self.waiting.popleft()
 
-    def takes(self, message: Message, kind: str | None) -> bool:
-        if self.table.topic is not None:
-            return message.topic == self.table.topic
-        return kind == self.table.type
+    def require_one(self, recording: Recording, message: Message) -> None:
+        """Find the topic of a type, and refuse a second one, whose rows would be mixed in."""
+        kind = self.table.type
+        if kind is None or recording.types.get(message.topic) != kind:
+            return
+        if self.topic not in (None, message.topic):
+            raise MappingError(
+                f"{recording.path} has {kind} as {self.topic} and {message.topic}; a mapping with "
+                "topic = says which is meant"
+            )
+        self.topic = message.topic
 
     def repeats(self, message: Message) -> bool:
         before, self._before = self._before, message
