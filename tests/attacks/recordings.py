@@ -125,7 +125,8 @@ def nmea() -> bytes:
         minutes = 30 + 0.001 * (time_s - 100)
         rmc = f"GPRMC,100140.00,A,48{minutes:07.4f},N,00433.5,W,1.0,90.0,080822,,"
         lines += [f"2022-08-08 {clock} >> {sentence(rmc)}", f"2022-08-08 {clock} nothing"]
-        lines.append(f"2022-08-08 {clock} >> $PAZM3,1,3,0,0,27,0.02,30,,4,90.0,,,,,,")
+        lines.append(f"2022-08-08 {clock} >> {sentence('HEHDT,350.0,T')}")
+        lines.append(f"2022-08-08 {clock} >> $PAZM3,1,0,0,0,27,0.02,30,,4,100.0,60.0,,,,,")
     return "".join(f"{line}\r\n" for line in lines).encode()
 
 
@@ -209,7 +210,7 @@ def _odometry(store: Any, time_s: float, **header: Any) -> Any:
     )
 
 
-def ros2(storage: str) -> bytes:
+def ros2(storage: str, topics: tuple[str, ...] = ("/odom",)) -> bytes:
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
 
@@ -219,10 +220,11 @@ def ros2(storage: str) -> bytes:
         path = Path(folder) / "bag"
         plugin = StoragePlugin.MCAP if storage == "mcap" else StoragePlugin.SQLITE3
         with Writer(path, version=9, storage_plugin=plugin) as writer:
-            odometry = writer.add_connection("/odom", kind, typestore=store)
-            for time_s in TIMES:
-                raw = store.serialize_cdr(_odometry(store, time_s), kind)
-                writer.write(odometry, round((1.7e9 + time_s) * 1e9), raw)
+            for topic in topics:
+                odometry = writer.add_connection(topic, kind, typestore=store)
+                for time_s in TIMES:
+                    raw = store.serialize_cdr(_odometry(store, time_s), kind)
+                    writer.write(odometry, round((1.7e9 + time_s) * 1e9), raw)
         (file,) = (one for one in path.iterdir() if one.suffix in (".mcap", ".db3"))
         return file.read_bytes()
 
@@ -247,7 +249,7 @@ def ros1() -> bytes:
 
 # ---- All -----------------------------------------------------------------------------------------
 
-_ODOM = """
+ODOM = """
 clock = "stamp"
 [odometry]
 topic = "/odom"
@@ -279,9 +281,9 @@ KINDS: Mapping[str, tuple[str, Any, str]] = {
     "csv": ("ugps.csv", ugps_csv, ""),
 }
 ROS_KINDS: Mapping[str, tuple[str, Any, str]] = {
-    "sqlite": ("dive.db3", lambda: ros2("sqlite"), _ODOM),
-    "mcap": ("dive.mcap", lambda: ros2("mcap"), _ODOM),
-    "ros1": ("dive.bag", ros1, _ODOM),
+    "sqlite": ("dive.db3", lambda: ros2("sqlite"), ODOM),
+    "mcap": ("dive.mcap", lambda: ros2("mcap"), ODOM),
+    "ros1": ("dive.bag", ros1, ODOM),
 }
 
 

@@ -25,14 +25,16 @@ from auvest.importers import (
     recipe,
 )
 from auvest.importers.expressions import expression
-from auvest.logs import CsvTable, LogError
+from auvest.logs import LogError
 from tests.attacks.recordings import (
     COUNT,
     KINDS,
+    ODOM,
     ROS_KINDS,
     TIMES,
     packet,
     recordings,
+    ros2,
     sentence,
     x_of,
 )
@@ -61,15 +63,17 @@ def made(folder: Path, kind: str) -> Path:
 
 
 def log_of(folder: Path, path: Path, mapping: str | None = None) -> dict[str, list[list[float]]]:
-    """The rows of each file of the log that an import makes."""
+    """The rows of each file of the log that an import makes, as they stand there."""
     recording = open_recording(path)
     if mapping is not None:
         written(folder, "mapping.toml", mapping)
     settings = folder / "mapping.toml"
     wanted = read_mapping(settings) if settings.exists() else recipe(recording.name)
-    assert wanted is not None
     log = import_recording(recording, wanted, folder / "log")
-    return {file.name: CsvTable(file).whole().tolist() for file in log.path.glob("*.csv")}
+    return {
+        file.name: np.loadtxt(file, delimiter=",", skiprows=1, ndmin=2).tolist()
+        for file in log.path.glob("*.csv")
+    }
 
 
 def messages(path: Path) -> list[Message]:
@@ -128,8 +132,22 @@ def test_underwater_gps_becomes_fixes(tmp_path: Path, kind: str) -> None:
 
 
 def test_usbl_sentences_become_fixes(tmp_path: Path) -> None:
+    """100 degrees from a bow at 350 is east, and 30 m of slant at 60 degrees are 15 m of range.
+
+    The boat's own place is where they count from.
+    """
     log = log_of(tmp_path, made(tmp_path, "nmea"))
-    assert log["fixes.csv"] == [[1659960000 + t, 3, 30, math.pi / 2] for t in TIMES]
+    expected = [[1659960000 + t, 0, 15, math.pi / 2] for t in TIMES]
+    np.testing.assert_allclose(log["fixes.csv"], expected, rtol=1e-14)
+    assert "beacons.csv" not in log
+    place = [48.5, -(4 + 33.5 / 60)]
+    first = log["leaders.csv"][0]
+    assert first == [1659960000 + TIMES[0], 0, *place]
+    lines = [(tmp_path / "log" / f"{name}.csv").read_text() for name in ("leaders", "fixes")]
+    assert [text.splitlines()[0] for text in lines] == [
+        "time_s,source,latitude_deg,longitude_deg",
+        "time_s,source,range_m,azimuth_rad",
+    ]
 
 
 def test_evologics(tmp_path: Path) -> None:
@@ -396,10 +414,38 @@ def test_mappings_that_are_wrong(tmp_path: Path, mapping: str, message: str) -> 
     assert not (tmp_path / "log").exists()
 
 
-def test_a_format_without_a_mapping_of_its_own_asks_for_one(tmp_path: Path) -> None:
-    result = call("import", made(tmp_path, "ulog"), tmp_path / "log")
-    assert result.exit_code == 2
-    assert "nothing is taken without --mapping" in result.stderr
+def test_messages_that_auvest_does_not_know_need_a_mapping(tmp_path: Path) -> None:
+    name, raw, _ = recordings()["ulog"]
+    path = written(tmp_path, name, raw)
+    with pytest.raises(LogError, match=r"dive.ulg: holds nothing .*vehicle_gps_position_0"):
+        log_of(tmp_path, path)
+    assert [one.name for one in tmp_path.iterdir()] == [name]
+
+
+def test_two_topics_of_one_type_are_not_mixed(tmp_path: Path) -> None:
+    pytest.importorskip("rosbags", reason="rosbags is not installed: pip install 'auvest[ros]'")
+    path = written(tmp_path, "dive.mcap", ros2("mcap", topics=("/a", "/b")))
+    mapping = ODOM.replace('topic = "/odom"', 'type = "nav_msgs/msg/Odometry"')
+    with pytest.raises(MappingError, match="nav_msgs/msg/Odometry as /a and /b"):
+        log_of(tmp_path, path, mapping)
+    log = log_of(tmp_path, path, ODOM.replace("/odom", "/b"))
+    assert log == {"odometry.csv": [[t, 0.25, 0.0, 0.0] for t in TIMES[1:]]}
+
+
+def test_rows_that_depend_on_other_files(tmp_path: Path) -> None:
+    text = "t,r,b\n1,30,0.5\n"
+    rows = "rows = [{source = 0, x_m = 0, y_m = 0}]\n"
+    fixes = '[fixes]\ntopic = "row"\nsource = 0\nrange_m = "r"\nbearing_rad = "b"\n'
+    truth = '[truth]\ntopic = "row"\nx_m = "r"\ny_m = "b"\n'
+    path = written(tmp_path, "a.csv", text)
+    for others, conditions, there in (
+        (fixes, 'beside = "fixes"\n', True),
+        (truth, 'beside = "fixes"\n', False),
+        (fixes, 'unless = "fixes"\n', False),
+        (truth, 'unless = "fixes"\n', True),
+    ):
+        log = log_of(tmp_path, path, f"{others}[beacons]\n{rows}{conditions}")
+        assert ("beacons.csv" in log) == there
 
 
 # ---- What is refused -----------------------------------------------------------------------------
@@ -471,7 +517,7 @@ def test_a_file_of_which_nothing_is_left_is_refused(tmp_path: Path) -> None:
     with pytest.raises(LogError, match="value is 'none', not a number"):
         log_of(tmp_path, path, mapping)
     path = written(tmp_path, "a.alog", "%% LOGSTART 1\n1 OTHER p 5\n")
-    with pytest.raises(LogError, match=r"holds nothing for a log by .*looks for NAV_X"):
+    with pytest.raises(LogError, match=r"holds nothing for a log; .* is of NAV_X"):
         log_of(tmp_path, path, mapping)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 from collections.abc import Mapping
 from datetime import datetime
@@ -19,6 +20,7 @@ import pytest
 from typer.testing import CliRunner
 
 from auvest.cli import app
+from auvest.logs import LogFolder
 
 _FOLDER = Path(os.environ.get("AUVEST_DATA", "")) / "recorders"
 pytestmark = pytest.mark.skipif(
@@ -342,3 +344,230 @@ def test_ulog() -> None:
         topic, _, number = label.partition("#")
         message = shown(found, topic, number)
         assert {field: message[field] for field in values} == values
+
+
+# ---- Logs of them --------------------------------------------------------------------------------
+
+
+def log_of(
+    name: str, folder: Path, mapping: str | None = None
+) -> tuple[dict[str, list[dict[str, float]]], list[str]]:
+    """The rows of each file of the log as they stand there, and what the import noted."""
+    words = ["import", "--json", str(_FOLDER / name), str(folder / "log")]
+    if mapping is not None:
+        (folder / "mapping.toml").write_text(mapping)
+        words += ["--mapping", str(folder / "mapping.toml")]
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == 0, result.output
+    log = {}
+    for path in (folder / "log").glob("*.csv"):
+        header, *lines = path.read_text().splitlines()
+        names = header.split(",")
+        log[path.stem] = [
+            dict(zip(names, map(float, line.split(",")), strict=True)) for line in lines
+        ]
+    document = json.loads(result.stdout)
+    assert document["rows"] == {f"{stem}.csv": len(rows) for stem, rows in log.items()}
+    return log, document["notes"]
+
+
+@pytest.mark.parametrize(
+    ("name", "rows"),
+    [
+        ("dvl/a50_tcp_still.txt", 250 - 16 - 1),  # without repeats, and one not valid
+        ("dvl/a50_tcp_straight_v1.txt", 3),  # 11 different reports, 8 without the ground
+        ("dvl/a50_logged.csv", 269),
+    ],
+)
+def test_a_dvl_alone_is_odometry(name: str, rows: int, tmp_path: Path) -> None:
+    """Its own x and y, forward and starboard; the notes say what a log needs besides."""
+    log, notes = log_of(name, tmp_path)
+    assert list(log) == ["odometry"]
+    assert len(log["odometry"]) == rows
+    first = log["odometry"][0]
+    known = facts()[name]["values"]["1"]
+    assert first["speed_m_s"] == float(known["vx"])
+    assert first["starboard_m_s"] == float(known["vy"])
+    assert any("not yet a log that can be replayed" in note for note in notes)
+
+
+def test_the_bag_of_a_dvl_is_odometry_at_its_stamps(tmp_path: Path) -> None:
+    pytest.importorskip("rosbags", reason="rosbags is not installed: pip install 'auvest[ros]'")
+    log, _ = log_of("ros/dvl_a50_circle.bag", tmp_path)
+    assert len(log["odometry"]) == 378 - 75
+    known = facts()["ros/dvl_a50_circle.bag"]["values"]["/dvl/data#1"]
+    assert log["odometry"][0] == {
+        "time_s": float(known["stamp"]),
+        "speed_m_s": known["vx"],
+        "starboard_m_s": known["vy"],
+    }
+
+
+def test_an_auv_with_dvl_depth_and_gps(tmp_path: Path) -> None:
+    """A mapping of its own: what is odometry here, a bag's types alone do not say."""
+    pytest.importorskip("rosbags", reason="rosbags is not installed: pip install 'auvest[ros]'")
+    mapping = """
+        clock = "stamp"
+        [odometry]
+        topic = "/dvl_dead_reckoning"
+        [odometry.increments]
+        x_m = "pose.pose.position.x"
+        y_m = "pose.pose.position.y"
+        heading_rad = {yaw = [
+          "pose.pose.orientation.w", "pose.pose.orientation.x", "pose.pose.orientation.y",
+          "pose.pose.orientation.z"]}
+        [compass]
+        topic = "/modem_imu"
+        heading_rad = {yaw = ["orientation.w", "orientation.x", "orientation.y", "orientation.z"]}
+        [depth]
+        topic = "/depth_data"
+        depth_m = {field = "pose.pose.position.z", scale = -1}
+        [positions]
+        topic = "/gps_odom"
+        x_m = "pose.pose.position.x"
+        y_m = "pose.pose.position.y"
+    """
+    log, notes = log_of("ros/cougars_cleaned_bag", tmp_path, mapping)
+    known = facts()["ros/cougars_cleaned_bag"]["values"]
+    assert len(log["odometry"]) == 638 - 1
+    assert len(log["compass"]) == 1532
+    assert log["depth"][99] == {
+        "time_s": float(known["/depth_data#100"]["stamp"]),
+        "depth_m": -known["/depth_data#100"]["z"],
+    }
+    # Increments, put together again, are where dead reckoning went.
+    east = north = 0.0
+    heading = 0.0
+    for row in log["odometry"]:
+        east += row["forward_m"] * math.cos(heading) - row["left_m"] * math.sin(heading)
+        north += row["forward_m"] * math.sin(heading) + row["left_m"] * math.cos(heading)
+        heading += row["turn_rad"]
+        if row["time_s"] >= float(known["/dvl_dead_reckoning#100"]["stamp"]) - 1e-6:
+            break
+    first, last = known["/dvl_dead_reckoning#1"], known["/dvl_dead_reckoning#100"]
+    distance = math.hypot(last["x"] - first["x"], last["y"] - first["y"])
+    assert math.hypot(east, north) == pytest.approx(distance, rel=1e-9)
+    # There was no fix at first, and NaN in its place.
+    without = int(next(note for note in notes if "/gps_odom" in note).split()[2])
+    assert len(log["positions"]) == 204 - without
+    fix = known["/gps_odom#100"]
+    assert {"time_s": float(fix["stamp"]), "x_m": fix["x"], "y_m": fix["y"]} in log["positions"]
+    LogFolder(tmp_path / "log")
+
+
+@pytest.mark.parametrize("name", ["ardupilot/ardusub_small.BIN", "ardupilot/ardusub_dive_5m.BIN"])
+def test_dataflash_of_an_rov(name: str, tmp_path: Path) -> None:
+    log, _ = log_of(name, tmp_path)
+    known, found = facts()[name], listed(name)
+    counts = {"odometry": "XKF1", "compass": "ATT", "depth": "CTUN"}
+    assert {file: len(rows) for file, rows in log.items()} == {
+        file: known["counts"][topic] for file, topic in counts.items()
+    }
+    attitude = known["values"]["ATT#100"]
+    assert log["compass"][99]["time_s"] == attitude["TimeUS"] / 1e6
+    assert log["compass"][99]["compass_rad"] == pytest.approx(math.radians(attitude["Yaw"]))
+    assert log["depth"][99]["depth_m"] == -known["values"]["CTUN#100"]["Alt"]
+    ekf = shown(found, "XKF1", "100")
+    speed = math.hypot(log["odometry"][99]["speed_m_s"], log["odometry"][99]["starboard_m_s"])
+    assert speed == pytest.approx(math.hypot(ekf["VN"], ekf["VE"]), rel=1e-12)
+
+
+def test_tlog_of_a_dive(tmp_path: Path) -> None:
+    """Latitude and longitude stay 0, which is no place; from 12 m to the surface."""
+    log, _ = log_of("ardupilot/ardusub_dive_12m.tlog", tmp_path)
+    known = facts()["ardupilot/ardusub_dive_12m.tlog"]
+    assert {file: len(rows) for file, rows in log.items()} == {"compass": 1236, "depth": 186}
+    assert log["depth"][0]["depth_m"] == pytest.approx(12.179)
+    assert log["depth"][99]["depth_m"] == pytest.approx(0.103)
+    assert log["compass"][99]["compass_rad"] == known["values"]["ATTITUDE#100"]["yaw"]
+    first = known["first_last_timestamp"]["ATTITUDE"][0]
+    assert log["compass"][0]["time_s"] == pytest.approx(first, abs=3e-7, rel=0)
+
+
+def test_tlog_with_acoustic_positions(tmp_path: Path) -> None:
+    """All that a replay needs."""
+    log, _ = log_of("ardupilot/ardusub_gps_input.tlog", tmp_path)
+    known = facts()["ardupilot/ardusub_gps_input.tlog"]
+    assert {file: len(rows) for file, rows in log.items()} == {
+        "compass": 5245, "depth": 792, "odometry": 792, "positions": 1011,
+    }  # fmt: skip
+    fix = known["values"]["GPS_INPUT#100"]
+    assert log["positions"][99]["latitude_deg"] == pytest.approx(fix["lat"] / 1e7, abs=1e-12)
+    assert log["positions"][99]["longitude_deg"] == pytest.approx(fix["lon"] / 1e7, abs=1e-12)
+    LogFolder(tmp_path / "log")
+
+
+def test_acoustic_fixes(tmp_path: Path) -> None:
+    log, notes = log_of("ugps/ugps_g2_filtered_2.csv", tmp_path)
+    assert len(log["fixes"]) == 457
+    known = facts()["ugps/ugps_g2_filtered_2.csv"]["values"]["1"]
+    x, y = float(known["x"]), float(known["y"])
+    assert log["fixes"][0] == {
+        "time_s": float(known["timestamp"]),
+        "source": 0,
+        "range_m": pytest.approx(math.hypot(x, y)),
+        "bearing_rad": pytest.approx(math.atan2(y, x)),
+    }
+    assert "left out: 43 messages of position that are not position_valid = true" in notes
+    assert log["beacons"] == [{"source": 0, "x_m": 0, "y_m": 0}]
+    LogFolder(tmp_path / "log")
+
+
+def test_the_place_of_a_boat(tmp_path: Path) -> None:
+    for name, count in (("nmea/nmea_udp_pier.txt", 129), ("nmea/saab_r4.log", 41)):
+        folder = tmp_path / Path(name).stem
+        folder.mkdir()
+        log, _ = log_of(name, folder)
+        assert list(log) == ["leaders"]
+        assert len(log["leaders"]) == count
+        known = facts()[name]["values"]["GPRMC#1"]
+        assert log["leaders"][0]["latitude_deg"] == pytest.approx(known["latitude"], rel=1e-15)
+        assert log["leaders"][0]["longitude_deg"] == pytest.approx(known["longitude"], rel=1e-15)
+
+
+def test_usbl_beside_a_gnss_compass(tmp_path: Path) -> None:
+    """A fix is the slant range made level, and the angle from the boat's bow at that time."""
+    log, _ = log_of("usbl/azimuth_suite_2.log", tmp_path)
+    assert {file: len(rows) for file, rows in log.items()} == {"fixes": 141, "leaders": 120}
+    first = log["fixes"][0]  # 33.9 m at 4.5 degrees, 1.3 up; heading 289.77 38 ms before
+    assert first["range_m"] == pytest.approx(33.9 * math.cos(math.radians(1.3)))
+    assert first["azimuth_rad"] == pytest.approx(math.radians(289.77 + 4.5 - 360))
+    LogFolder(tmp_path / "log")
+
+
+def test_usbl_without_times(tmp_path: Path) -> None:
+    mapping = """
+        period_s = 1
+        [fixes]
+        topic = "USRTH"
+        source = 0
+        range_m = {along = ["slant_range_m", 0, {field = "true_elevation_deg", unit = "deg"}]}
+        azimuth_rad = {field = "true_bearing_compass_deg", unit = "deg"}
+        [beacons]
+        rows = [{source = 0, x_m = 0, y_m = 0}]
+    """
+    log, _ = log_of("usbl/cerulean_rovl_rth.txt", tmp_path, mapping)
+    assert [row["time_s"] for row in log["fixes"]] == list(range(90))
+    assert log["fixes"][0]["range_m"] == pytest.approx(14.8 * math.cos(math.radians(28.3)))
+    assert log["fixes"][0]["azimuth_rad"] == pytest.approx(math.radians(40.7))
+    LogFolder(tmp_path / "log")
+
+
+def test_usbl_table_as_fixes(tmp_path: Path) -> None:
+    """It is north of the transponder, which is +y."""
+    log, _ = log_of("usbl/pool_usbl_ranges.csv", tmp_path)
+    known = facts()["usbl/pool_usbl_ranges.csv"]
+    assert len(log["fixes"]) == known["rows"]
+    for row, label in ((log["fixes"][0], "row_1"), (log["fixes"][42], "row_43")):
+        assert row["range_m"] == float(known[label]["range"])
+        assert row["bearing_rad"] == math.pi / 2
+    LogFolder(tmp_path / "log")
+
+
+def test_alog_of_an_auv(tmp_path: Path) -> None:
+    """NAV_Y comes before NAV_X of the same time."""
+    log, _ = log_of("alog/bluefin_unicorn.alog", tmp_path)
+    assert {file: len(rows) for file, rows in log.items()} == {"truth": 1000, "depth": 1000}
+    assert log["truth"][0] == {"time_s": 3870.24, "x_m": 4399.514508, "y_m": 2456.458545}
+    assert log["truth"][999] == {"time_s": 4122.24, "x_m": 4614.641954, "y_m": 2139.872277}
+    assert log["depth"][0] == {"time_s": 3870.24, "depth_m": 34.554}

@@ -27,7 +27,6 @@ import typer
 
 from auvest.commands import options
 from auvest.commands.console import Terminal, shown, table
-from auvest.commands.exit_codes import ExitCode
 from auvest.commands.version import version
 from auvest.importers import (
     FORMATS,
@@ -114,12 +113,6 @@ def _import_recording(
 ) -> None:
     recording = open_recording(source, kind)
     wanted = recipe(recording.name) if mapping is None else read_mapping(mapping)
-    if wanted is None:
-        terminal.fail(
-            f"{source}: of {recording.title} nothing is taken without --mapping; --list says what "
-            "it holds",
-            ExitCode.USAGE,
-        )
     with terminal.writing(output):
         made = import_recording(recording, wanted, output, force=force)
     for note in made.notes:

@@ -59,10 +59,7 @@ class ReplayResults:
         ValueError
             If a time cannot be exported, or a table cannot be read.
         """
-        estimates, measurements = (
-            self._rows(name)
-            for name in ("estimates", "measurements")
-        )
+        estimates, measurements = (self._rows(name) for name in ("estimates", "measurements"))
         return heapq.merge(estimates, measurements, key=lambda row: row.time_ns)
 
     def _rows(self, name: Table) -> Iterator[Row]:

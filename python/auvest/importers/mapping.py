@@ -137,10 +137,10 @@ def read_mapping(path: Path) -> LogMapping:
         raise MappingError(f"{path}: {error}") from None
 
 
-def recipe(format_name: str) -> LogMapping | None:
-    """Give the mapping that comes with the package for a format; None if there is none."""
-    path = _RECIPES / f"{format_name}.toml"
-    return replace(read_mapping(path), lenient=True) if path.exists() else None
+def recipe(format_name: str) -> LogMapping:
+    """Give the mapping that comes with the package for a format."""
+    found = read_mapping(_RECIPES / f"{format_name}.toml")
+    return replace(found, name=f"what auvest takes from {format_name}", lenient=True)
 
 
 def _mapping(name: str, document: dict[str, Any]) -> LogMapping:

@@ -100,19 +100,18 @@ class _Writing:
                     recording = open_recording(recording.path.parent / name)
                 self._read(recording, [_Source(table) for table in tables if not table.rows])
         if not any(self.rows[table.file] for table in self._mapping.tables if not table.rows):
-            topics = ", ".join(
-                str(table.topic or table.type) for table in self._mapping.tables if not table.rows
-            )
+            tables = [table for table in self._mapping.tables if not table.rows]
+            topics = ", ".join(dict.fromkeys(str(table.topic or table.type) for table in tables))
             why = "; ".join(f"{count} {what}" for what, count in self._left_out.items())
             raise LogError(
                 self._recording.path,
-                f"holds nothing for a log by {self._mapping.name}, which looks for {topics}"
+                f"holds nothing for a log; {self._mapping.name} is of {topics}"
                 + (f" ({why})" if why else ""),
             )
         for table in self._mapping.tables:
             alone = table.beside is not None and not self.rows[table.beside]
             if alone or (table.unless is not None and self.rows[table.unless]):
-                self.rows[table.file] = 0
+                del self.rows[table.file]
         for file in self._headers:
             if not self.rows[file]:
                 (self._folder / file).unlink()
