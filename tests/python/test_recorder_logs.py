@@ -254,6 +254,12 @@ def test_padding_at_the_end_of_ulog_data_is_not_there(tmp_path: Path) -> None:
     assert first.values == {"timestamp": 100_000_000, "at.x": 1.0, "at.y": 2.0, "valid": True}
 
 
+def test_numbers_whose_sum_is_none_have_no_mean(tmp_path: Path) -> None:
+    path = written(tmp_path, "a.csv", "t,x\n1,1e308\n2,1e308\n")
+    found = listing(open_recording(path))["topics"]["row"]["fields"]["x"]
+    assert found == {"min": 1e308, "max": 1e308, "mean": None, "missing": 0}
+
+
 # ---- NMEA ----------------------------------------------------------------------------------------
 
 
@@ -462,6 +468,7 @@ def test_rows_that_depend_on_other_files(tmp_path: Path) -> None:
         ("a.csv", "1,2\n3,4\n", r"a.csv, line 1: '1' is not the name of a column"),
         ("a.json", '{"vx": 1', r"a.json, line 1: is not JSON"),
         ("a.json", '{"vx": 1e999}\n', r"a.json, line 1: is not JSON: 1e999 is not a number"),
+        ("a.json", '{"vx": ' + "9" * 400 + "}\n", r"a.json, line 1: is not JSON: 9+ is not a num"),
         ("a.json", '{"vx": 1, "time": -5}\n', r"a.json, line 1: time is -5, which are no mill"),
         ("a.alog", "%% LOGSTART 1\n1 X\n", r"a.alog, line 2: 2 words; expected time"),
         ("a.alog", "%% LOGSTART 1\nnan X p 1\n", r"a.alog, line 2: 'nan' is no time in s"),

@@ -59,7 +59,9 @@ class JsonLines(Recording):
 
     def _report(self, line: str, where: str) -> dict[str, Any]:
         try:
-            report = json.loads(line, parse_constant=_no_number, parse_float=_finite)
+            report = json.loads(
+                line, parse_constant=_no_number, parse_float=_finite, parse_int=_whole
+            )
         except (ValueError, RecursionError) as error:
             why = "nested too deeply" if isinstance(error, RecursionError) else error
             raise self.error(where, f"is not JSON: {why}") from None
@@ -89,6 +91,10 @@ def _finite(text: str) -> float:
     if abs(number) == float("inf"):
         raise ValueError(f"{text[:40]} is not a number")
     return number
+
+
+def _whole(text: str) -> int | float:
+    return int(text) if len(text) <= 18 else _finite(text)
 
 
 def _topic(report: dict[str, Any]) -> str:

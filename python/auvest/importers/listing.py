@@ -41,7 +41,9 @@ class _Field:
     def document(self) -> dict[str, Any]:
         found: dict[str, Any] = {}
         if self.numbers:
-            found |= {"min": self.low, "max": self.high, "mean": self.total / self.numbers}
+            mean = self.total / self.numbers  # the sum may be beyond any float
+            found |= {"min": self.low, "max": self.high}
+            found["mean"] = mean if math.isfinite(mean) else None
         if self.minus_one:
             found["minus_one"] = self.minus_one  # by which many sensors say that they have nothing
         if self.true is not None:
