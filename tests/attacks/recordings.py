@@ -40,7 +40,7 @@ def dataflash() -> bytes:
     for time_s in TIMES:
         us = round(time_s * 1e6)
         parts.append(b"\xa3\x95\x81" + struct.pack("<Qffhi", us, x_of(time_s), 2, -150, 325))
-    parts.append(b"\xa3\x95\x83" + struct.pack("<QBIHii", 105_500_000, 1, 0, 0, 0, 0))
+    parts.append(b"\xa3\x95\x83" + struct.pack("<QBIHii", 105_500_000, 1, 5, 1999, 0, 0))
     return b"".join(parts)
 
 

@@ -393,6 +393,19 @@ def test_messages_without_times_need_a_period(tmp_path: Path) -> None:
     assert log["fixes.csv"] == [[0, 0, 14.8, bearing], [0.5, 0, 14.8, bearing]]
 
 
+def test_times_in_another_unit_are_the_mappings_to_tell(tmp_path: Path) -> None:
+    """Milliseconds since 1970 are no seconds; a single one among seconds is an error."""
+    path = written(tmp_path, "a.csv", "timestamp,x\n1700000000500,1\n1700000001000,2\n")
+    mapping = '[truth]\ntopic = "row"\nx_m = "x"\ny_m = 0\n'
+    with pytest.raises(LogError, match=r"line 2: row has no time; .* time_s = {field = "):
+        log_of(tmp_path, path, mapping)
+    log = log_of(tmp_path, path, mapping + 'time_s = {field = "timestamp", unit = "ms"}\n')
+    assert log["truth.csv"] == [[1700000000.5, 1, 0], [1700000001, 2, 0]]
+    path = written(tmp_path, "a.csv", "timestamp,x\n1700000000,1\n1700000001000,2\n")
+    with pytest.raises(LogError, match="line 3: timestamp is '1700000001000', which is no time"):
+        listing(open_recording(path))
+
+
 @pytest.mark.parametrize(
     ("mapping", "message"),
     [
@@ -549,6 +562,9 @@ def test_pipes_are_not_waited_for(tmp_path: Path) -> None:
         (["--list"], "Missing argument"),
         (["--list", "a", "b", "c"], r"expected \[FORMAT\] SOURCE"),
         (["a"], r"expected \[FORMAT\] SOURCE OUT"),
+        (["a", "b", "--at", "5"], "is for --list"),
+        (["--list", "a", "--mapping", "m.toml"], "is for logs of recordings"),
+        (["goats14", "a", "b", "--mapping", "m.toml"], "is for logs of recordings"),
         (["gif", "a", "b"], "'gif' is none of the formats"),
     ],
 )

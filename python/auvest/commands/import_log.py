@@ -78,9 +78,13 @@ def command(
             f"{', '.join(IMPORTERS)}.",
             param_hint="FORMAT",
         )
+    if at and not listed:
+        raise typer.BadParameter("is for --list.", param_hint="'--at'")
     given = list(map(Path, words if kind is None else words[1:]))
     if kind is None and not listed:
         kind = layout_of(given[0])
+    if mapping is not None and (listed or kind in IMPORTERS):
+        raise typer.BadParameter("is for logs of recordings.", param_hint="'--mapping'")
     with terminal.usage_errors():
         if listed:
             found = listing(open_recording(given[0], kind), at or ())

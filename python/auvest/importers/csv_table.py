@@ -31,7 +31,7 @@ class CsvTableRecording(Recording):
     def messages(self, topics: Container[str] | None = None) -> Iterator[Message]:
         """See :class:`Recording`."""
         names: list[str] = []
-        blank = 0
+        blank = rows = 0
         for number, line, ended in text_lines(self.path):
             where = f"line {number}"
             if not line.strip():
@@ -52,6 +52,9 @@ class CsvTableRecording(Recording):
                 continue
             if len(cells) != len(names):
                 raise self.error(where, f"{len(cells)} cells, expected {len(names)}: truncated?")
+            rows += 1
+            if rows == 1 and clock is not None and _other_unit(cells[clock]):
+                clock = None  # a mapping says which
             if topics is None or topic in topics:
                 time_ns = None if clock is None else nanoseconds(cells[clock])
                 if clock is not None and time_ns is None:
@@ -70,6 +73,11 @@ class CsvTableRecording(Recording):
             if names.count(name) > 1:
                 raise self.error("line 1", f"has the column {name} twice")
         return names
+
+
+def _other_unit(cell: str) -> bool:
+    """Whether a time is a number, but not of seconds."""
+    return isinstance(value_of(cell), (int, float)) and nanoseconds(cell) is None
 
 
 def _topic(names: set[str]) -> str:

@@ -209,7 +209,11 @@ class _Writing:
     def _time(self, recording: Recording, message: Message) -> float:
         time_ns = message.stamp_ns if self._mapping.clock == "stamp" else message.time_ns
         if time_ns is None:
-            what, other = "no time", "period_s tells how long it is from one message to the next"
+            what = "no time"
+            other = (
+                'time_s = {field = "...", unit = "ms"} tells where it is, or period_s how long it '
+                "is from one message to the next"
+            )
             if self._mapping.clock == "stamp":
                 what, other = "no stamp", 'clock = "recorded" takes the time of the recording'
             raise RecordingError(
