@@ -520,6 +520,16 @@ def test_what_no_log_can_hold_is_refused_and_leaves_nothing(
     assert sorted(one.name for one in tmp_path.iterdir()) == ["a.csv", "mapping.toml"]
 
 
+def test_times_that_go_back_are_said(tmp_path: Path) -> None:
+    """The rows stay in the order of recording, in which a replay takes them."""
+    path = written(tmp_path, "a.csv", "t,x\n1,1\n3,2\n2,3\n4,4\n")
+    settings = written(tmp_path, "m.toml", '[truth]\ntopic = "row"\nx_m = "x"\ny_m = 0\n')
+    result = call("import", path, tmp_path / "log", "--mapping", settings, "--json")
+    assert "truth.csv: times go back 1 x" in json.loads(result.stdout)["notes"]
+    rows = np.loadtxt(tmp_path / "log" / "truth.csv", delimiter=",", skiprows=1)
+    assert rows[:, 0].tolist() == [1, 3, 2, 4]
+
+
 def test_rows_without_a_number_are_left_out_and_counted(tmp_path: Path) -> None:
     path = written(tmp_path, "a.csv", "t,x,y\n1,2,3\n2,nan,3\n3,,3\n4,5,6\n")
     settings = written(tmp_path, "m.toml", '[truth]\ntopic = "row"\nx_m = "x"\ny_m = "y"\n')

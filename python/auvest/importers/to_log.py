@@ -80,7 +80,8 @@ class _Writing:
         self._files: dict[str, TextIO] = {}
         self._left_out: Counter[str] = Counter()
         self._headers: dict[str, tuple[str, ...]] = {}
-        self._more: list[str] = []
+        self._goes_back: Counter[str] = Counter()
+        self._last_s: dict[str, float] = {}
 
     def run(self) -> None:
         """Write every file.
@@ -124,7 +125,7 @@ class _Writing:
             *(f"nothing for {file}" for file in empty),
             *(f"left out: {count} {what}" for what, count in self._left_out.items()),
             *(f"passed over: {count} x {what}" for what, count in self._recording.skipped.items()),
-            *self._more,
+            *(f"{file}: times go back {count} x" for file, count in (+self._goes_back).items()),
         ]
 
     def _open(self, table: Table, stack: ExitStack) -> None:
@@ -204,6 +205,9 @@ class _Writing:
                     f"{column.name} would be {value:.10g}, not {column.expected}{hint}",
                 )  # fmt: skip
             row.append(int(value) if column.integer else float(value))
+        time_s = row[0]
+        self._goes_back[table.file] += time_s < self._last_s.get(table.file, time_s)
+        self._last_s[table.file] = time_s
         self._write(table, row)
 
     def _time(self, recording: Recording, message: Message) -> float:
