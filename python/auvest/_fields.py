@@ -32,13 +32,13 @@ def number(default: float) -> Any:
     return _field(default, as_number)
 
 
-def positive(default: float, *, infinite: bool = False) -> Any:
-    """Take a number above 0."""
+def positive(default: float | None, *, infinite: bool = False) -> Any:
+    """Take a number above 0; None as a default stands for nothing."""
     return _field(default, partial(as_number, bound="positive", infinite=infinite))
 
 
-def not_negative(default: float) -> Any:
-    """Take a finite number of at least 0."""
+def not_negative(default: float | None) -> Any:
+    """Take a finite number of at least 0; None as a default stands for nothing."""
     return _field(default, partial(as_number, bound="not negative"))
 
 

@@ -25,10 +25,11 @@ COMMANDS: Mapping[tuple[str, ...], str] = {
     ("cost",): (
         "Measure a filter with your models on the simulated MEGA2560: flash, RAM, stack, cycles."
     ),
+    ("export",): "Write results of a replay for Foxglove (MCAP) or as a ROS 2 bag.",
     ("filters",): "List the filters: what each takes, and where it runs with the same bits.",
     ("fit",): "Say which filters fit a chip with so much RAM and flash.",
     ("hil",): "Play a log to the filter on a chip, and compare every bit with the desk.",
-    ("import",): "Turn a published recording into logs for 'auvest replay'.",
+    ("import",): "Turn a recording into a log for 'auvest replay', or list what it holds.",
     ("library",): "Write the Arduino library: a zip for the IDE or PlatformIO.",
     ("mission",): "Play the vehicle that the sketch mission steers, on a board or simulated.",
     ("replay",): "Replay recorded runs through a filter.",

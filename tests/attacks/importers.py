@@ -19,8 +19,8 @@ from functools import cache
 from pathlib import Path
 from typing import ClassVar
 
+from auvest.importers.sets import IMPORTERS
 from auvest.logs import LogError, LogFolder
-from auvest.logs.importers import IMPORTERS
 from tests.attacks.damage import damaged, steps
 from tests.attacks.frame import Case, Failed, main
 from tests.attacks.logs import table

@@ -106,18 +106,18 @@ class Replay(Attack):
 class Import(Attack):
     """`auvest import` of two recordings of one set."""
 
-    outputs = ("out/ugps_pier59_1", "out/ugps_pier59_2")
+    outputs = ("out/ugps_1", "out/ugps_2")
 
     def prepare(self, root: Path) -> None:
         for variant, place in zip(VARIANTS, (3.0, 4.0), strict=True):
-            (root / variant).mkdir()
+            (root / variant / "ugps").mkdir(parents=True)
             for number in (1, 2):
                 rows = [f"{k},1,{place + 0.1 * k:.3f},{number}" for k in range(3000)]
                 name = f"fixes_{number}.csv"
-                text(name, "t,valid,x_fwd,y_stbd", rows, root / variant)
+                text(name, "t,valid,x_fwd,y_stbd", rows, root / variant / "ugps")
 
     def run(self, root: Path, variant: str) -> None:
-        call("import", "ugps_pier59", root / variant, root / "out")
+        call("import", "ugps_pier59", root / variant / "ugps", root / "out")
 
 
 class Simulate(Attack):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import auvest
-from tests.attacks import frame, importers, interface, logs, states
+from tests.attacks import frame, importers, interface, logs, recorders, states
 from tests.attacks.frame import Case, Failed
 
 
@@ -124,6 +124,22 @@ def test_importers():
     counts = attacked(importers.ATTACK, 150)
     assert counts["imported"] > 20
     assert counts["refused"] > 50
+
+
+def test_recorders():
+    counts = attacked(recorders.ATTACK, 120)
+    for kind in recorders.recordings():
+        assert counts[f"{kind} listed"] + counts[f"{kind} not listed"] > 0
+    assert sum(count for what, count in counts.items() if what.endswith("imported")) > 20
+
+
+def test_the_attack_on_recorders_sees_an_exception(monkeypatch, capsys):
+    kinds = {"alog": recorders.recordings()["alog"]}
+    monkeypatch.setattr(recorders, "recordings", lambda: kinds)
+    monkeypatch.setattr("auvest.importers.alog.nanoseconds", lambda text: int(float(text) * 1e9))
+    result = frame.run(recorders.ATTACK, 150, seed=1)
+    assert "alog: list: ValueError" in result.failures
+    capsys.readouterr()
 
 
 def test_the_attack_on_importers_sees_an_exception(monkeypatch, capsys):

@@ -7,9 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from auvest.cli import app
+from auvest.importers.sets import IMPORTERS, layout_of
 from auvest.logs import LogError, LogFolder
-from auvest.logs.importers import IMPORTERS
 
 
 def recording(folder: Path, files: dict[str, str]) -> Path:
@@ -20,7 +22,7 @@ def recording(folder: Path, files: dict[str, str]) -> Path:
 
 
 def imported(folder: Path, name: str, files: dict[str, str]) -> dict[str, LogFolder]:
-    folders = IMPORTERS[name](recording(folder / "set", files), folder / "logs")
+    folders = IMPORTERS[name](recording(folder / name, files), folder / "logs")
     return {path.name: LogFolder(path) for path in folders}
 
 
@@ -38,6 +40,30 @@ def goats(heading: float) -> dict[str, str]:
         "reference_batch.csv": "t,x,y\n0.5,7.0,8.0\n1.5,7.5,9.0\n",
         "groundtruth.csv": f"t,theta\n0.5,{heading}\n1.5,9.0\n",
     }
+
+
+HAT = {
+    "odometry.csv": "t,dx_body,dy_body,dtheta\n1.0,0.5,-0.25,0.125\n",
+    "leader_ranges.csv": (
+        "t,leader_x,leader_y,leader_pos_var,range\n"
+        "1.0,10.0,20.0,4.0,30.0\n"
+        "2.0,10.0,20.0,9.0,30.0\n"  # stale, whatever its variance
+        "3.0,10.0,20.0,2.25,31.0\n"
+        "4.0,10.0,21.0,0.0,31.0\n"
+        "5.0,11.0,21.0,0.25,31.0\n"
+    ),
+    "groundtruth.csv": "t,x,y,theta\n0.0,1.0,2.0,0.5\n",
+}
+
+LABYRINTH = {
+    "ranges.csv": (
+        "t,module,range,module_x,module_y\n"
+        "1.0,2,5.0,10.0,0.0\n1.5,1,6.0,0.0,10.0\n2.0,2,5.5,10.0,0.0\n"
+    ),
+    "odometry.csv": "t,v,w\n0.5,0.25,-0.125\n",
+    "groundtruth.csv": "t,x,y\n0.75,3.0,4.0\n1.75,3.5,4.5\n",
+    "initial_heading.txt": "0.5\n",
+}
 
 
 def test_goats14_turns_the_body_to_forward_and_left(tmp_path: Path) -> None:
@@ -69,19 +95,7 @@ def test_goats14_starts_with_the_heading_of_the_forward_axis(
 
 def test_hat_charles_tells_sigma_and_leaves_out_what_is_stale(tmp_path: Path) -> None:
     """A variance of 4 m^2 is 2 m. A message is stale if range and both coordinates repeat."""
-    files = {
-        "odometry.csv": "t,dx_body,dy_body,dtheta\n1.0,0.5,-0.25,0.125\n",
-        "leader_ranges.csv": (
-            "t,leader_x,leader_y,leader_pos_var,range\n"
-            "1.0,10.0,20.0,4.0,30.0\n"
-            "2.0,10.0,20.0,9.0,30.0\n"  # stale, whatever its variance
-            "3.0,10.0,20.0,2.25,31.0\n"
-            "4.0,10.0,21.0,0.0,31.0\n"
-            "5.0,11.0,21.0,0.25,31.0\n"
-        ),
-        "groundtruth.csv": "t,x,y,theta\n0.0,1.0,2.0,0.5\n",
-    }
-    log = imported(tmp_path, "hat_charles", files)["hat_charles"]
+    log = imported(tmp_path, "hat_charles", HAT)["hat_charles"]
     assert whole(log, "odometry.csv") == [[1.0, 0.5, -0.25, 0.125]]
     assert whole(log, "ranges.csv") == [[1, 1, 30], [3, 1, 31], [4, 1, 31], [5, 1, 31]]
     assert whole(log, "leaders.csv") == [
@@ -94,16 +108,7 @@ def test_hat_charles_tells_sigma_and_leaves_out_what_is_stale(tmp_path: Path) ->
 
 
 def test_labyrinth_uwb_starts_at_the_truth_and_names_each_module_once(tmp_path: Path) -> None:
-    files = {
-        "ranges.csv": (
-            "t,module,range,module_x,module_y\n"
-            "1.0,2,5.0,10.0,0.0\n1.5,1,6.0,0.0,10.0\n2.0,2,5.5,10.0,0.0\n"
-        ),
-        "odometry.csv": "t,v,w\n0.5,0.25,-0.125\n",
-        "groundtruth.csv": "t,x,y\n0.75,3.0,4.0\n1.75,3.5,4.5\n",
-        "initial_heading.txt": "0.5\n",
-    }
-    log = imported(tmp_path, "labyrinth_uwb", files)["labyrinth_uwb"]
+    log = imported(tmp_path, "labyrinth_uwb", LABYRINTH)["labyrinth_uwb"]
     assert whole(log, "odometry.csv") == [[0.5, 0.25, -0.125]]
     assert whole(log, "ranges.csv") == [[1.0, 2, 5.0], [1.5, 1, 6.0], [2.0, 2, 5.5]]
     assert whole(log, "beacons.csv") == [[1, 0.0, 10.0], [2, 10.0, 0.0]]
@@ -179,6 +184,44 @@ def test_ugps_pier59_leaves_out_polls_without_a_fix(tmp_path: Path) -> None:
             rtol=1e-15,
         )
         assert log.beacons() == {0: (0.0, 0.0)}
+    (tmp_path / "ugps_pier59" / "fixes_3.csv").write_text(text)
+    folders = IMPORTERS["ugps_pier59"](tmp_path / "ugps_pier59", tmp_path / "more")
+    assert [folder.name for folder in folders] == [f"ugps_pier59_{k}" for k in (1, 2, 3)]
+
+
+@pytest.mark.parametrize(
+    ("layout", "files", "without"),
+    [
+        ("goats14", goats(0.25), ["reference_batch.csv", "groundtruth.csv"]),
+        ("hat_charles", HAT, ["groundtruth.csv"]),
+        ("labyrinth_uwb", LABYRINTH, ["groundtruth.csv"]),
+    ],
+)
+def test_a_log_is_named_by_its_folder_and_a_missing_truth_is_said(
+    tmp_path: Path, layout: str, files: dict[str, str], without: list[str]
+) -> None:
+    source = recording(tmp_path / "set_15", {k: v for k, v in files.items() if k not in without})
+    assert layout_of(source) == layout
+    notes: list[str] = []
+    (folder,) = IMPORTERS[layout](source, tmp_path / "logs", note=notes.append)
+    assert folder.name == "set_15"
+    assert not (folder / "truth.csv").exists()
+    assert notes == [
+        "set_15 has no truth: nothing can be scored against it",
+        "set_15 has neither start.csv nor truth.csv: a replay cannot start",
+    ]
+    (source / "odometry.csv").unlink()
+    with pytest.raises(
+        LogError, match=r"odometry\.csv: cannot be read: .*; without odometry no log"
+    ):
+        IMPORTERS[layout](source, tmp_path / "more")
+
+
+def test_the_command_finds_a_layout_by_its_files(tmp_path: Path) -> None:
+    source = recording(tmp_path / "trial", goats(0.25))
+    result = CliRunner().invoke(app, ["import", str(source), str(tmp_path / "logs")])
+    assert result.exit_code == 0, result.output
+    assert LogFolder(tmp_path / "logs" / "trial").beacons() == {3: (10.0, -20.0)}
 
 
 # ---- What is refused -----------------------------------------------------------------------------
@@ -220,7 +263,7 @@ def test_what_no_log_can_hold_is_refused_and_leaves_nothing(
     files[file] = files[file].replace(old, new, 1)
     with pytest.raises(LogError, match=message):
         imported(tmp_path, "goats14", files)
-    assert [path.name for path in tmp_path.iterdir()] == ["set"]
+    assert [path.name for path in tmp_path.iterdir()] == ["goats14"]
 
 
 def test_tables_may_begin_with_a_mark(tmp_path: Path) -> None:

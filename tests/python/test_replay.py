@@ -36,6 +36,7 @@ from auvest import (
 )
 from auvest.cli import app
 from auvest.logs import FILES, LogError, LogFolder, reader
+from auvest.logs.layout import SPELLINGS
 from auvest.logs.write import write_file
 from auvest.models import ConstantAcceleration
 from auvest.replay import Settings, engine, find_settings, read_settings, replay, settings_from
@@ -911,11 +912,14 @@ def test_the_documented_layout_is_the_layout() -> None:
     for name, layouts in FILES.items():
         assert f"`{name}`" in page
         for layout in layouts:
-            header = ",".join(column.name for column in layout)
-            optional = header.rpartition(",")
-            assert f"`{header}`" in page or (
-                f"`{optional[0]}` and optionally `{optional[2]}`" in page
-            )
+            also = ", ".join(f"`{column.name}`" for column in layout.optional)
+            optionally = f" and optionally {also}" if also else ""
+            required = ",".join(column.name for column in layout.required)
+            assert f"`{required}`{optionally} |" in page, (name, layout)
+    for names, spellings in SPELLINGS.items():
+        for other in spellings:
+            pair = [", ".join(f"`{name}`" for name in one) for one in (names, other)]
+            assert f"| {pair[0]} | {pair[1]} |" in page
 
 
 # ---- The command ---------------------------------------------------------------------------------
@@ -998,7 +1002,7 @@ def test_import_command(tmp_path: Path) -> None:
     result = call("import", "ugps_pier59", source, tmp_path / "logs", "--json")
     assert result.exit_code == 0, result.output
     folders = [Path(path) for path in json.loads(result.stdout)["logs"]]
-    assert [folder.name for folder in folders] == ["ugps_pier59_1", "ugps_pier59_2"]
+    assert [folder.name for folder in folders] == ["ugps_1", "ugps_2"]
     np.testing.assert_allclose(
         LogFolder(folders[0])["fixes.csv"].whole(),
         [[0.0, 0, 5.0, math.atan2(4, 3)], [1.0, 0, 2.0, math.pi / 2]],

@@ -14,8 +14,8 @@ import pytest
 from typer.testing import CliRunner
 
 from auvest.cli import app
+from auvest.importers.sets import IMPORTERS
 from auvest.logs import LogFolder
-from auvest.logs.importers import IMPORTERS
 from auvest.replay import find_settings, replay, settings_from
 from auvest.reproduce.logs import measure as logs
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Literal, TypeAlias, get_args, get_type_hints
 
@@ -60,33 +61,97 @@ class OdometrySettings:
     turn_offset_rad_s: float = number(0.0)
     max_step_s: float = positive(0.1)  # of velocity odometry
     gap_s: float = positive(15.0)  # a velocity holds no longer
+    latency_s: float = not_negative(0.0)  # lines stand so long after their motion
+
+
+@dataclass(frozen=True, kw_only=True)
+class CompassSettings:
+    """Compass: what is added to its headings, and how long before their times they were taken."""
+
+    offset_rad: float = number(0.0)  # declination and misalignment, from +x towards +y
+    latency_s: float = not_negative(0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RangeSource:
+    """One source of ranges, where it differs from the others."""
+
+    sigma_m: float | None = positive(None)
+    latency_s: float | None = not_negative(None)
 
 
 @dataclass(frozen=True, kw_only=True)
 class RangeSettings:
-    """Ranges: noise, and the least time between two of one source that are used."""
+    """Ranges: noise, the least time between two of one source that are used, latency."""
 
     sigma_m: float = positive(1.0)
     every_s: float = not_negative(0.0)
+    latency_s: float = not_negative(0.0)  # a line stands when its range came in, so long after
+    sources: Mapping[int, RangeSource] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FixSource:
+    """One station, where it differs from the others."""
+
+    sigma_range_m: float | None = positive(None)
+    sigma_bearing_rad: float | None = positive(None)
+    sigma_elevation_rad: float | None = positive(None)
+    latency_s: float | None = not_negative(None)
 
 
 @dataclass(frozen=True, kw_only=True)
 class FixSettings:
-    """Fixes by range and bearing: noise, and the least time between two that are used."""
+    """Fixes by range and bearing: noise, the least time between two that are used, latency."""
 
     sigma_range_m: float = positive(0.1)
     sigma_bearing_rad: float = positive(0.02)
+    sigma_elevation_rad: float = positive(0.02)
     near_field: float = not_negative(5.0)
     every_s: float = not_negative(0.0)
+    latency_s: float = not_negative(0.0)
+    sources: Mapping[int, FixSource] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PositionSettings:
+    """Absolute positions: noise where positions.csv has none, thinning, latency."""
+
+    sigma_m: float = positive(1.0)
+    sigma_depth_m: float = positive(1.0)
+    every_s: float = not_negative(0.0)
+    latency_s: float = not_negative(0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class VelocitySettings:
+    """Velocities of a tracked craft: noise and latency."""
+
+    sigma_forward_m_s: float = positive(0.05)
+    sigma_left_m_s: float = positive(0.05)
+    sigma_down_m_s: float = positive(0.05)
+    latency_s: float = not_negative(0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DepthSettings:
+    """Depths: noise, where they are measured, and latency."""
+
+    sigma_m: float = positive(0.1)
+    latency_s: float = not_negative(0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ProcessSettings:
-    """Driving noise of the tracked craft's motion, as of :class:`auvest.ConstantAcceleration`."""
+    """Driving noise of a tracked craft, as of :class:`auvest.ConstantAcceleration`.
+
+    With elevations or depths that of :class:`auvest.WhiteAcceleration`: both ``velocity_psd``.
+    """
 
     position_psd: float = not_negative(0.0)
     velocity_psd: float = not_negative(1e-2)
     acceleration_psd: float = not_negative(1e-6)
+    vertical_velocity_psd: float = not_negative(1e-3)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,8 +180,12 @@ class Settings:
     filter: FilterSettings = FilterSettings()
     start: StartSettings = StartSettings()
     odometry: OdometrySettings = OdometrySettings()
+    compass: CompassSettings = CompassSettings()
     ranges: RangeSettings = RangeSettings()
     fixes: FixSettings = FixSettings()
+    positions: PositionSettings = PositionSettings()
+    velocities: VelocitySettings = VelocitySettings()
+    depth: DepthSettings = DepthSettings()
     process: ProcessSettings = ProcessSettings()
     interval: IntervalSettings = IntervalSettings()
     log: LogSettings = LogSettings()
@@ -191,7 +260,9 @@ def _section(kind: type[Any], values: dict[str, Any], where: str) -> Any:
     types = get_type_hints(kind)
     checked: dict[str, Any] = {}
     for key, value in values.items():
-        if "take" in known[key].metadata:
+        if key == "sources":
+            checked[key] = _sources(types[key], value, f"{where[:-1]}.sources")
+        elif "take" in known[key].metadata:
             try:
                 checked[key] = known[key].metadata["take"](key, value)
             except (ValueError, TypeError) as error:
@@ -199,6 +270,19 @@ def _section(kind: type[Any], values: dict[str, Any], where: str) -> Any:
         else:
             checked[key] = _choice(types[key], value, f"{where} {key}")
     return kind(**checked)
+
+
+def _sources(kind: Any, given: object, where: str) -> dict[int, Any]:
+    """Take what is said of single sources, by their numbers."""
+    if not isinstance(given, dict):
+        raise ValueError(f"{where}] must be a section")
+    _, one = get_args(kind)
+    chosen = {}
+    for number_, values in given.items():
+        if not number_.isdecimal() or not isinstance(values, dict):
+            raise ValueError(f"{where}.{number_}] must be a section named by a source's number")
+        chosen[int(number_)] = _section(one, values, f"{where}.{number_}]")
+    return chosen
 
 
 def _choice(kind: Any, value: object, where: str) -> object:

@@ -99,8 +99,8 @@ def replay(
     filter_name : str, optional
         The filter; default: that of the settings, else robust-ekf for ranges and ukf for fixes.
     folder : Path, optional
-        Where the tables go: estimates, measurements and errors as CSV and Parquet, trajectory.tum.
-        Nothing is written without it.
+        Where the tables go: estimates, measurements and errors as CSV and Parquet, trajectory.tum
+        and truth.tum. Nothing is written without it.
     progress : callable, optional
         Called with the bytes of the log that are read, and all.
     causes : bool
@@ -147,6 +147,8 @@ def replay(
                     outliers.add(_outliers(batch.measurements))
                 if progress is not None:
                     progress(engine.bytes_read, engine.bytes)
+            if folder is not None and "truth.csv" in log:
+                _write_truth(log, folder, stack)
             found += checks.innovations(local, settings, name, residuals, found, causes=causes)
         except KeyboardInterrupt:
             interrupted = True
@@ -191,6 +193,17 @@ def _open(folder: Path | None, stack: ExitStack) -> list[Callable[[tables.Batch]
         tum.write(batch.estimates)
 
     return [write]
+
+
+def _write_truth(log: LogFolder, folder: Path, stack: ExitStack) -> None:
+    """Write the truth beside the track, in the same form."""
+    from auvest.replay.sink import TumFile  # here, because pyarrow takes long to import
+
+    tum = stack.enter_context(TumFile(folder / "truth.tum"))
+    table = log["truth.csv"]
+    for rows, _ in table.chunks():
+        columns = {name: table.column(rows, name, 0.0) for name in ("time_s", "x_m", "y_m")}
+        tum.write({**columns, "heading_rad": table.column(rows, "heading_rad", 0.0)})
 
 
 def _outliers(measurements: tables.Columns) -> tables.Columns:

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from auvest.importers.sets import IMPORTERS
 from auvest.logs import LogFolder
-from auvest.logs.importers import IMPORTERS
 from auvest.replay import Settings, find_settings, replay
 from auvest.replay.config import FilterName, KernelName
 from auvest.replay.engine import Localiser

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from auvest.logs.importers import IMPORTERS
+from auvest.importers.sets import IMPORTERS
 from auvest.replay import Settings, checks, find_settings
 from auvest.replay.checks import Checked
 from auvest.reproduce.mistakes.injected import ALL, MISTAKES

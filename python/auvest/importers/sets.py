@@ -1,6 +1,8 @@
-"""From published recordings to logs: one function per set, ``importer(source, output)``.
+"""From data sets with a layout of their own to logs, ``importer(source, output)``.
 
-Each writes one or more log folders below ``output`` and returns their paths, all of them or none.
+A function is named by the set that had the layout first, and reads every folder of that layout.
+It writes one or more log folders below ``output``, named by the source's folder, and returns their
+paths, all of them or none. A set without truth becomes a log without; that is said.
 Nothing is filtered or corrected on the way, except where a function's docstring says so; what no
 log could hold is refused, with the file and the line it stands in.
 """
@@ -8,6 +10,7 @@ log could hold is refused, with the file and the line it stands in.
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
@@ -32,15 +35,28 @@ _WHOLE = frozenset({"beacon", "module", "observer", "robot", "subject", "valid"}
 class Importer(Protocol):
     """Writes the logs of a set below a folder and returns where."""
 
-    def __call__(self, source: Path, output: Path, *, force: bool = False) -> list[Path]:
-        """See :class:`auvest._outputs.NewFolder` for ``force``."""
+    def __call__(
+        self,
+        source: Path,
+        output: Path,
+        *,
+        force: bool = False,
+        note: Callable[[str], None] = lambda _: None,
+    ) -> list[Path]:
+        """``force`` is :class:`auvest._outputs.NewFolder`'s; ``note`` takes what a user reads."""
 
 
 def _importer(read: Callable[[Path], dict[str, Log]]) -> Importer:
     """Make an importer of what reads a set: logs by the names of their folders."""
 
     @functools.wraps(read)
-    def write(source: Path, output: Path, *, force: bool = False) -> list[Path]:
+    def write(
+        source: Path,
+        output: Path,
+        *,
+        force: bool = False,
+        note: Callable[[str], None] = lambda _: None,
+    ) -> list[Path]:
         logs = read(source)
         with ExitStack() as stack:
             made = []
@@ -57,6 +73,10 @@ def _importer(read: Callable[[Path], dict[str, Log]]) -> Importer:
                     except ValueError as error:
                         raise LogError(source, f"no log can be made of this: {error}") from None
                 LogFolder(new.part)
+                if "truth.csv" not in log:
+                    note(f"{name} has no truth: nothing can be scored against it")
+                if not {"start.csv", "truth.csv", "fixes.csv"} & set(log):
+                    note(f"{name} has neither start.csv nor truth.csv: a replay cannot start")
             for new in made:
                 new.publish()
         return [new.path for new in made]
@@ -75,7 +95,7 @@ def _require_apart(source: Path, target: Path) -> None:
 
 @_importer
 def goats14(source: Path) -> dict[str, Log]:
-    """AUV with acoustic beacons (GOATS 2002, set 14).
+    """AUV with acoustic beacons (GOATS 2002; set 14 is the one that is validated with).
 
     The odometry's forward axis is +y; here it is turned to forward and left. Truth is the robust
     batch reference; the run starts there, with the heading of the INS.
@@ -83,16 +103,17 @@ def goats14(source: Path) -> dict[str, Log]:
     odometry = _table(source / "odometry.csv", "t", "dx_body", "dy_body", "dtheta")
     ranges = _table(source / "ranges.csv", "t", "beacon", "range")
     beacons = _table(source / "beacons.csv", "beacon", "x", "y")
-    reference = _table(source / "reference_batch.csv", "t", "x", "y")
-    onboard = _table(source / "groundtruth.csv", "t", "theta")
     log = {
         "odometry.csv": _steps(odometry[:, 0], odometry[:, 2], -odometry[:, 1], odometry[:, 3]),
         "ranges.csv": _ranges(ranges),
         "beacons.csv": _beacons(beacons),
-        "truth.csv": _truth(reference),
-        "start.csv": _start(reference[0], float(onboard[0, 1]) + math.pi / 2),
     }
-    return {"goats14": log}
+    if (path := source / "reference_batch.csv").exists():
+        reference = _table(path, "t", "x", "y")
+        log["truth.csv"] = _truth(reference)
+        onboard = _table(source / "groundtruth.csv", "t", "theta")
+        log["start.csv"] = _start(reference[0], float(onboard[0, 1]) + math.pi / 2)
+    return {_name(source): log}
 
 
 @_importer
@@ -111,7 +132,6 @@ def hat_charles(source: Path) -> dict[str, Log]:
         raise LogError(
             path, f"a variance of {messages[k, 3]:g}", line=k + 2, column="leader_pos_var"
         )
-    truth = _table(source / "groundtruth.csv", "t", "x", "y", "theta")
     fresh = np.append(True, (np.diff(messages[:, [1, 2, 4]], axis=0) != 0).any(axis=1))
     messages = messages[fresh]
     leader = np.ones(len(messages))
@@ -125,9 +145,10 @@ def hat_charles(source: Path) -> dict[str, Log]:
             "y_m": messages[:, 2],
             "sigma_m": np.sqrt(messages[:, 3]),
         },
-        "truth.csv": _truth(truth),
     }
-    return {"hat_charles": log}
+    if (path := source / "groundtruth.csv").exists():
+        log["truth.csv"] = _truth(_table(path, "t", "x", "y", "theta"))
+    return {_name(source): log}
 
 
 @_importer
@@ -135,16 +156,17 @@ def labyrinth_uwb(source: Path) -> dict[str, Log]:
     """Small robot and four UWB modules (TU Chemnitz)."""
     ranges = _table(source / "ranges.csv", "t", "module", "range", "module_x", "module_y")
     odometry = _table(source / "odometry.csv", "t", "v", "w")
-    truth = _table(source / "groundtruth.csv", "t", "x", "y")
-    heading = _table(source / "initial_heading.txt")
     log = {
         "odometry.csv": _velocity(odometry),
         "ranges.csv": _ranges(ranges),
         "beacons.csv": _beacons(np.unique(ranges[:, [1, 3, 4]], axis=0)),
-        "truth.csv": _truth(truth),
-        "start.csv": _start(truth[0], float(heading[0, 0])),
     }
-    return {"labyrinth_uwb": log}
+    if (path := source / "groundtruth.csv").exists():
+        truth = _table(path, "t", "x", "y")
+        heading = _table(source / "initial_heading.txt")
+        log["truth.csv"] = _truth(truth)
+        log["start.csv"] = _start(truth[0], float(heading[0, 0]))
+    return {_name(source): log}
 
 
 @_importer
@@ -191,17 +213,19 @@ def mrclam(source: Path) -> dict[str, Log]:
 
 @_importer
 def ugps_pier59(source: Path) -> dict[str, Log]:
-    """ROV tracked by a fixed antenna; the two recordings, polls without a fix left out."""
+    """ROV tracked by a fixed antenna: recordings fixes_1.csv on; polls without a fix left out."""
     logs: dict[str, Log] = {}
-    for number in (1, 2):
+    for number in itertools.count(1):
         path = source / f"fixes_{number}.csv"
+        if number > 1 and not path.exists():
+            break
         fixes = _table(path, "t", "valid", "x_fwd", "y_stbd", missing=("x_fwd", "y_stbd"))
         valid = fixes[:, 1] == 1
         unknown = np.flatnonzero(valid & np.isnan(fixes).any(axis=1))
         if unknown.size:
             raise LogError(path, "a valid fix without a position", line=int(unknown[0]) + 2)
         fixes = fixes[valid]
-        logs[f"ugps_pier59_{number}"] = {
+        logs[f"{_name(source)}_{number}"] = {
             "fixes.csv": {
                 "time_s": fixes[:, 0],
                 "source": np.zeros(len(fixes), int),
@@ -222,6 +246,25 @@ IMPORTERS: Mapping[str, Importer] = {
     "mrclam": mrclam,
     "ugps_pier59": ugps_pier59,
 }
+
+#: A file that tells the layout.
+_TELLS: Mapping[str, str] = {
+    "goats14": "beacons.csv",
+    "hat_charles": "leader_ranges.csv",
+    "labyrinth_uwb": "initial_heading.txt",
+    "mrclam6": "sightings.csv",
+    "mrclam": "Barcodes.dat",
+    "ugps_pier59": "fixes_1.csv",
+}
+
+
+def layout_of(source: Path) -> str | None:
+    """Name the layout that a folder has, one of :data:`IMPORTERS`; None if it has none of them."""
+    return next((name for name, file in _TELLS.items() if (source / file).is_file()), None)
+
+
+def _name(source: Path) -> str:
+    return source.resolve().name
 
 
 def _robots(
@@ -327,7 +370,9 @@ def _lines(path: Path) -> list[str]:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         reason = "is not UTF-8 text" if isinstance(error, ValueError) else error.strerror or error
-        raise LogError(path, f"cannot be read: {reason}") from None
+        alone = path.name == "odometry.csv" and isinstance(error, FileNotFoundError)
+        why = "; without odometry no log can be made of ranges" if alone else ""
+        raise LogError(path, f"cannot be read: {reason}{why}") from None
     if text and not text.endswith("\n"):
         raise LogError(path, "does not end with a line end: truncated", line=text.count("\n") + 1)
     return text.splitlines()
