@@ -377,12 +377,16 @@ def from_error(error: LogError) -> Finding:
 def _ignored_columns(log: LogFolder) -> Iterator[Finding]:
     """Name the columns that are of no use."""
     for table in log.tables.values():
-        unused = table.ignored
+        others = [one for one in log.tables.values() if one.path == table.path]
+        unused = [name for name in table.ignored if all(name in one.ignored for one in others)]
+        if table is not others[0]:  # said already
+            continue
+        turned: list[str] = []
         if table.name == "odometry.csv" and "compass.csv" in log:
-            turns = {"turn_rad", "yaw_rate_rad_s", "heading_rad"} & set(table.names)
-            unused = [*unused, *sorted(turns)]
+            turned = sorted({"turn_rad", "yaw_rate_rad_s", "heading_rad"} & set(table.names))
+            unused = [*unused, *turned]
         if unused:
-            more = "; compass.csv says how the craft turns" if unused != table.ignored else ""
+            more = "; compass.csv says how the craft turns" if turned else ""
             message = f"not read: {', '.join(unused)}{more}"
             yield finding("ignored_column", message, file=table.path.name, line=1)
 

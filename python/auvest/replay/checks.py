@@ -135,7 +135,7 @@ def check(path: Path, settings: Settings, filter_name: FilterName | None = None)
     seen: dict[str, FileSeen] = {}
     left: Residuals | None = None
     try:
-        log = LogFolder(path, truth=False)
+        log = LogFolder(path, truth=False, reading=settings.reading)
         shown = survey(log, limits(settings))
         found += [*shown.findings, *_idle(log, settings)]
         seen = shown.files
