@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -354,7 +354,8 @@ def survey(log: LogFolder, limits: Limits) -> Survey:
         files[name] = FileSeen(table, limits.reorder_s)
         for rows, first in table.chunks():
             files[name].add(rows, first)
-    found = [*ignored_files(log.path, log), *_ignored_columns(log)]
+    read = {table.path.name for table in log.tables.values()}
+    found = [*ignored_files(log.path, read), *_ignored_columns(log)]
     units = list(_units(files, limits))
     found += units
     found += _clocks(files)
@@ -391,9 +392,8 @@ def _ignored_columns(log: LogFolder) -> Iterator[Finding]:
             yield finding("ignored_column", message, file=table.path.name, line=1)
 
 
-def ignored_files(folder: Path, log: LogFolder | None = None) -> Iterator[Finding]:
-    """Name the tables in a log's folder that no log has."""
-    read = set() if log is None else {table.path.name for table in log.tables.values()}
+def ignored_files(folder: Path, read: Collection[str] = ()) -> Iterator[Finding]:
+    """Name the tables in a log's folder that no log has, beside those that are read."""
     for path in sorted(folder.iterdir()):
         table = path.suffix.lower() in (".csv", ".tsv", ".txt", ".dat")
         if path.name in read:
