@@ -8,10 +8,12 @@ cut into chunks.
 
 from __future__ import annotations
 
+import copy
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -28,6 +30,7 @@ from auvest.models import ConstantAcceleration, LeaderRange, Odometry, RangeBear
 from auvest.replay import tables
 from auvest.replay.config import FilterName, IntervalSettings, Settings
 from auvest.replay.motion import Motion, carry, dead_reckon
+from auvest.replay.smoothing import Heading, Smoothing, Track
 from auvest.replay.sources import Sources
 from auvest.replay.tables import Batch, Columns
 from auvest.replay.thinning import SAME_S, Thinning
@@ -60,9 +63,13 @@ class Replay(ABC):
     listener : callable, optional
         Gets each stretch of rows before the filter does: the filter, z, and the other arguments of
         its ``run``.
+    smoothing : Smoothing, optional
+        Gets them too; each batch then has its ``track``.
     """
 
     listener: Callable[[GaussianFilter, Rows, Mapping[str, Any]], None] | None = None
+    #: Gets the same, to go back over it.
+    smoothing: Smoothing | None = None
     _measured: str
 
     def __init__(self, log: LogFolder, settings: Settings, filter_name: FilterName) -> None:
@@ -142,6 +149,8 @@ class Replay(ABC):
         """Take the filter through these rows; who listens gets them first."""
         if self.listener is not None:
             self.listener(filter_, z, rows)
+        if self.smoothing is not None:
+            self.smoothing.rows(filter_, z, rows)
         return filter_.run(z, **rows)
 
     def _take(self, name: str, limit: float) -> Rows:
@@ -323,10 +332,14 @@ class Localiser(Replay):
             carry(segments, reckoned, at, truth[:, 0]),
         )
 
+        track = None
+        if self.smoothing is not None:
+            before = (self._x, self._P)
+            track = Track(final, at, before, truth[:, :3], partial(carry, segments), heading_of)
         self._now, self._x, self._P = float(at[-1]), states[-1:], spreads[-1:]
         self._reckoned = reckoned[-1:]
         self._motion.forget(self._now)
-        estimates = _estimates(at[1:], states[1:], states[1:, 2], spreads[1:], reckoned[1:])
+        estimates = _estimates(at[1:], states[1:], heading_of, spreads[1:], reckoned[1:])
         if self._filter.components > 1:
             said, size = (mixture[name][final] for name in tables.MIXTURE)
             named = {"convergence": tables.CONVERGENCES[said], "mixture_size": size}
@@ -337,6 +350,7 @@ class Localiser(Replay):
             errors=errors,
             ranges_m=ranges[:, 2],
             located=located,
+            track=track,
         )
 
     def _events(self, limit: float, measured: Rows) -> Rows:
@@ -466,21 +480,25 @@ class Tracker(Replay):
         states = np.concatenate([self._x, x])
         spreads = np.concatenate([self._P, covariance])
         held = np.flatnonzero(columns["outcome"] == tables.HELD_OUT)
-        predicted = self._carry(states, at, fixes[held, 0])
+        predicted = coast(states, at, fixes[held, 0])
         columns["held_out_error_m"][held] = np.hypot(*(predicted - seen[held]).T)
 
         truth = self._take("truth.csv", limit)
         truth = truth[truth[:, 0] >= self.start[0]]
         last_row = np.searchsorted(at, truth[:, 0], side="right") - 1
         nowhere = np.full((len(truth), 2), np.nan)
-        position = self._carry(states, at, truth[:, 0])
+        position = coast(states, at, truth[:, 0])
+        track = None
+        if self.smoothing is not None:
+            before = (self._x, self._P)
+            track = Track(np.arange(len(x)), at, before, truth[:, :3], coast, course_of)
         self._now, self._x, self._P = float(at[-1]), states[-1:], spreads[-1:]
-        course = np.arctan2(states[1:, 3], states[1:, 2])
         return Batch(
-            estimates=_estimates(at[1:], states[1:], course, spreads[1:], None),
+            estimates=_estimates(at[1:], states[1:], course_of, spreads[1:], None),
             measurements=columns,
             errors=self._errors(truth, position, spreads[last_row], nowhere),
             ranges_m=fixes[:, 2],
+            track=track,
         )
 
     def _fuse(
@@ -512,6 +530,7 @@ class Tracker(Replay):
         states: list[Floats] = [np.empty((0, 6))]
         spreads: list[Floats] = [np.empty((0, 6, 6))]
         now = self._now
+        start, steps = copy.copy(tracker), list[float]()
         for k in np.flatnonzero(offered).tolist():
             if fixes[k, 0] - now < tracker.interval - SAME_S:
                 columns["outcome"][k] = tables.HELD_OUT
@@ -523,6 +542,7 @@ class Tracker(Replay):
             tracker.predict(fixes[k, 0] - now)
             tracker.update(fixes[k, 2:4], place=station)
             tracker.feedback()
+            steps.append(float(fixes[k, 0]) - now)
             now, used[k] = float(fixes[k, 0]), True
             states.append(tracker.x[None])
             spreads.append(tracker.P[None])
@@ -533,14 +553,35 @@ class Tracker(Replay):
                 columns[f"weight_{m}"][k] = 1.0
             columns["nis"][k] = tracker.nis
             columns["near_field"][k] = tracker.near_field
+        if self.smoothing is not None and steps:
+            taken = {"dt": np.array(steps), "place": places[used, :2]}
+            self.smoothing.rows(start, fixes[used, 2:4], taken)
         return np.concatenate(states), np.concatenate(spreads), used
 
-    def _carry(self, states: Rows, at: Rows, time_s: Rows) -> Rows:
-        """Predicted positions at these times, each from the last state before it."""
-        k = np.searchsorted(at, time_s, side="right") - 1
-        dt = (time_s - at[k])[:, None]
-        half_square = 0.5 * dt * dt
-        return states[k, 0:2] + dt * states[k, 2:4] + half_square * states[k, 4:6]
+
+def heading_of(states: Floats, covariance: Floats) -> tuple[Floats, Floats]:
+    """Headings and their standard deviations, rad, of poses."""
+    return states[:, 2], np.sqrt(covariance[:, 2, 2])
+
+
+def course_of(states: Floats, covariance: Floats) -> tuple[Floats, Floats]:
+    """Courses and their standard deviations, rad; of one that stands they are not known."""
+    vx, vy = states[:, 2], states[:, 3]
+    square = vx * vx + vy * vy
+    across = vy * vy * covariance[:, 2, 2] - 2 * vx * vy * covariance[:, 2, 3]
+    across = across + vx * vx * covariance[:, 3, 3]
+    variance = np.full(len(square), np.nan)
+    np.divide(across, square * square, out=variance, where=square > 0)
+    return np.arctan2(vy, vx), np.sqrt(np.maximum(variance, 0.0))
+
+
+def coast(states: Floats, at: Floats, time_s: Rows) -> Floats:
+    """Predicted positions at these times, each from the last state before it."""
+    k = np.searchsorted(at, time_s, side="right") - 1
+    dt = (time_s - at[k])[:, None]
+    half_square = 0.5 * dt * dt
+    position: Floats = states[k, 0:2] + dt * states[k, 2:4] + half_square * states[k, 4:6]
+    return position
 
 
 def _build(
@@ -601,17 +642,12 @@ def replay_of(log: LogFolder, settings: Settings, filter_name: FilterName) -> Re
 
 
 def _estimates(
-    time_s: Floats, states: Floats, heading: Floats, covariance: Floats, reckoned: Floats | None
+    time_s: Floats, states: Floats, heading: Heading, covariance: Floats, reckoned: Floats | None
 ) -> Columns:
     unknown = np.full(len(time_s), np.nan)
     return {
         "time_s": time_s,
-        "x_m": states[:, 0],
-        "y_m": states[:, 1],
-        "heading_rad": heading,
-        "var_x_m2": covariance[:, 0, 0],
-        "cov_xy_m2": covariance[:, 0, 1],
-        "var_y_m2": covariance[:, 1, 1],
+        **tables.pose(states, covariance, *heading(states, covariance)),
         "dead_reckoned_x_m": unknown if reckoned is None else reckoned[:, 0],
         "dead_reckoned_y_m": unknown if reckoned is None else reckoned[:, 1],
     }
