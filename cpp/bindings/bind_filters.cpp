@@ -133,11 +133,9 @@ const Element* column(const py::dict& record, const char* name) {
   return py::cast<py::array_t<Element, py::array::c_style>>(value).data();
 }
 
-/// Rows of a record; see desk::Record. Gives how many were done, the status and the columns.
+/// What Python gives as a record; `given` must live as long as it.
 template <class Scalar>
-py::tuple run(FilterHandle<Scalar>& handle, const py::dict& given, const py::list& sensors,
-              bool covariance) {
-  const Occupied<Scalar> occupied(handle);
+desk::Record<Scalar> to_record(const py::dict& given, const py::list& sensors) {
   const auto z = given["z"].cast<Array<Scalar>>();
   desk::Record<Scalar> record;
   record.rows = static_cast<std::size_t>(z.shape(0));
@@ -152,9 +150,17 @@ py::tuple run(FilterHandle<Scalar>& handle, const py::dict& given, const py::lis
   for (const auto& sensor : sensors) {
     record.sensors.push_back(sensor.cast<SensorHandle<Scalar>>());
   }
+  return record;
+}
 
-  const py::ssize_t rows = z.shape(0);
-  const py::ssize_t m = z.shape(1);
+/// Rows of a record; see desk::Record. Gives how many were done, the status and the columns.
+template <class Scalar>
+py::tuple run(FilterHandle<Scalar>& handle, const py::dict& given, const py::list& sensors,
+              bool covariance) {
+  const Occupied<Scalar> occupied(handle);
+  const desk::Record<Scalar> record = to_record<Scalar>(given, sensors);
+  const auto rows = static_cast<py::ssize_t>(record.rows);
+  const auto m = static_cast<py::ssize_t>(record.width);
   const py::ssize_t n = handle.filter->states();
   const py::ssize_t full = covariance ? rows : 0;
   const bool sums = handle.filter->components() > 1;
@@ -202,6 +208,43 @@ py::tuple run(FilterHandle<Scalar>& handle, const py::dict& given, const py::lis
   result["convergence"] = convergence;
   result["mixture_size"] = size;
   return py::make_tuple(done, handle.status, result);
+}
+
+/// Smooths the first rows of a record; see desk::AnyFilter. `end` is the smoothed belief after them
+/// or None, lag_s NaN for all that comes later. Gives the status, x (rows, n), P (rows, n, n), and
+/// the smoothed belief before the first row.
+template <class Scalar>
+py::tuple smooth(const FilterHandle<Scalar>& handle, const py::dict& given, const py::list& sensors,
+                 py::ssize_t rows, const py::object& end, double lag_s) {
+  require_idle(handle);
+  const desk::Record<Scalar> record = to_record<Scalar>(given, sensors);
+  const py::ssize_t n = handle.filter->states();
+  py::array_t<Scalar> x({rows, n}), p({rows, n, n}), start_x(n), start_p({n, n});
+  Array<Scalar> end_x, end_p;
+  desk::Smoothed<Scalar> out;
+  out.rows = static_cast<std::size_t>(rows);
+  out.end_x = out.end_P = nullptr;
+  if (!end.is_none()) {
+    const auto pair = end.cast<py::tuple>();
+    end_x = pair[0].cast<Array<Scalar>>();
+    end_p = pair[1].cast<Array<Scalar>>();
+    require_shape(end_x, {n}, "end");
+    require_shape(end_p, {n, n}, "end");
+    out.end_x = end_x.data();
+    out.end_P = end_p.data();
+  }
+  out.x = x.mutable_data();
+  out.P = p.mutable_data();
+  out.start_x = start_x.mutable_data();
+  out.start_P = start_p.mutable_data();
+  out.lag_s = lag_s;
+  const auto from = handle.filter->clone();
+  Status status;
+  {
+    py::gil_scoped_release release;
+    status = from->smooth(record, out);
+  }
+  return py::make_tuple(status, x, p, py::make_tuple(start_x, start_p));
 }
 
 template <class Scalar>
@@ -461,6 +504,8 @@ void bind_precision(py::module_& m) {
            py::arg("age_s"))
       .def("feedback", &feedback<Scalar>, py::arg("reference"))
       .def("run", &run<Scalar>, py::arg("record"), py::arg("sensors"), py::arg("covariance"))
+      .def("smooth", &smooth<Scalar>, py::arg("record"), py::arg("sensors"), py::arg("rows"),
+           py::arg("end"), py::arg("lag_s"))
       .def("save", &save<Scalar>)
       .def("restore", &restore<Scalar>, py::arg("state"), py::arg("sensors"))
       .def("set_report", &set_report<Scalar>, py::arg("report"), py::arg("status"))

@@ -15,6 +15,7 @@
 #include "auvest/filters/late_updates.hpp"
 #include "auvest/runtime/any_interval.hpp"
 #include "desk/models.hpp"
+#include "desk/smoother.hpp"
 
 namespace auvest {
 namespace desk {
@@ -116,6 +117,11 @@ class AnyFilter {
   /// done. A measurement that is older than the late memory is left out and marked.
   virtual std::size_t run(const Record<Scalar>& record, const Columns<Scalar>& out,
                           Report<Scalar>& last, Status& status) = 0;
+
+  /// Smooths the first rows of a record that goes through as run() takes it, dt given in every row;
+  /// the filter stays where it is. Rows behind those say what their late measurements, or a lag,
+  /// ask for.
+  virtual Status smooth(const Record<Scalar>& record, const Smoothed<Scalar>& out) const = 0;
 
   /// What the filter says of itself, as Robust does.
   virtual Status status() const = 0;
@@ -221,22 +227,13 @@ class FilterFor final : public AnyFilter<Scalar> {
 
   Report<Scalar> update(const Scalar* z, const std::shared_ptr<const AnySensor<Scalar>>& sensor,
                         const Scalar* place, Scalar age) override {
-    Sensor placed;
-    const auto& model = static_cast<const SensorFor<Scalar, N>&>(*sensor);
     // Only what is remembered is owned: counting owners takes as long as a tenth of an update.
-    const auto owner = late() ? sensor : std::shared_ptr<const AnySensor<Scalar>>();
-    placed.model = std::shared_ptr<const SensorFor<Scalar, N>>(owner, &model);
-    placed.moved = place != nullptr;
-    if (placed.moved) {
-      for (int i = 0; i < sensor->place; ++i) placed.place[i] = place[i];
-    }
-    typename Sensor::Measurement value = Sensor::Measurement::Zero();
-    for (int i = 0; i < sensor->size; ++i) value(i) = z[i];
+    const Sensor there = late() ? placed(sensor, place) : placed(borrowed(*sensor), place);
+    const typename Sensor::Measurement value = to_measurement(z, *sensor);
     Robust& robust = filter_;
-    const Scalar oldest = late_s_ * Scalar(1.00001);  // an age may be a sum that was rounded
-    if (age > oldest) return Report<Scalar>(Status::kTimeBackwards);
-    if (late()) return memory_.update(robust, value, placed, age);
-    return robust.update(value, placed);
+    if (age > oldest()) return Report<Scalar>(Status::kTimeBackwards);
+    if (late()) return memory_.update(robust, value, there, age);
+    return robust.update(value, there);
   }
 
   Status feedback(const Scalar* reference) override {
@@ -268,6 +265,45 @@ class FilterFor final : public AnyFilter<Scalar> {
       last = report;
     }
     return record.rows;
+  }
+
+  Status smooth(const Record<Scalar>& record, const Smoothed<Scalar>& out) const override {
+    BackwardPass<Robust> pass(late() ? memory_.base() : static_cast<const Robust&>(filter_),
+                              !math::is_nan(out.lag_s));
+    Awaited awaited(late_s_);  // as in the late memory, with all that is in it
+    for (int k = 0; late() && k < memory_.events().size(); ++k) {
+      awaited.insert(k, AwaitedEvent(memory_.events()[k], false));
+    }
+    std::vector<double> times;
+    double now = 0;
+    for (std::size_t k = 0; k < record.rows; ++k) {
+      typename Event::Input input = Event::Input::Zero();
+      for (int i = 0; i < inputs(); ++i) {
+        input(i) =
+            record.input[k * static_cast<std::size_t>(inputs()) + static_cast<std::size_t>(i)];
+      }
+      now += static_cast<double>(record.dt[k]);
+      times.push_back(now);
+      Status status =
+          await(AwaitedEvent(Event(record.dt[k], input), true), awaited.size(), awaited, pass);
+      const auto& sensor = sensor_of(record, k);
+      if (status == Status::kOk && measured(record, k)) {
+        const Scalar age = record.age != nullptr ? record.age[k] : Scalar(0);
+        int at = 0;
+        const bool too_late = age > oldest() || place_of(awaited, age, at) != Status::kOk;
+        const Event event(to_measurement(record.z + k * record.width, *sensor),
+                          placed(sensor, place_of_row(record, k)));
+        if (!too_late) status = await(AwaitedEvent(event, false), at, awaited, pass);
+      }
+      if (status != Status::kOk) return status;
+    }
+    while (awaited.size() > 0) {
+      const Status status = redo(awaited[0], pass);
+      if (status != Status::kOk) return status;
+      awaited.remove_first();
+    }
+    pass.finish();
+    return go_back(pass, times, out);
   }
 
   Status status() const override { return filter_.status(); }
@@ -406,23 +442,76 @@ class FilterFor final : public AnyFilter<Scalar> {
   }
 
   bool late() const { return late_s_ > Scalar(0); }
+  /// An age may be a sum that was rounded.
+  Scalar oldest() const { return late_s_ * Scalar(1.00001); }
+
+  /// An event that a late measurement may still go before.
+  struct AwaitedEvent : Event {
+    bool row;  // the prediction of a row of the record
+    AwaitedEvent(const Event& event, bool of_row) : Event(event), row(of_row) {}
+  };
+  using Awaited = RecentEvents<AwaitedEvent>;
+
+  /// Puts an event where it belongs, and lets go of those that are too old, as the late memory
+  /// does.
+  static Status await(const AwaitedEvent& event, int at, Awaited& awaited,
+                      BackwardPass<Robust>& pass) {
+    while (awaited.full()) {
+      if (at == 0) return redo(event, pass);
+      const Status status = redo(awaited[0], pass);
+      if (status != Status::kOk) return status;
+      awaited.remove_first();
+      --at;
+    }
+    awaited.insert(at, event);
+    return Status::kOk;
+  }
+  static Status redo(const AwaitedEvent& event, BackwardPass<Robust>& pass) {
+    return event.row ? pass.predict(event.dt, event.input) : event.redo(pass.filter());
+  }
+
+  static const std::shared_ptr<const AnySensor<Scalar>>& sensor_of(const Record<Scalar>& record,
+                                                                   std::size_t k) {
+    return record
+        .sensors[record.sensor != nullptr ? static_cast<std::size_t>(record.sensor[k]) : 0];
+  }
+  static bool measured(const Record<Scalar>& record, std::size_t k) {
+    const Scalar* z = record.z + k * record.width;
+    bool given = false;
+    for (int i = 0; i < sensor_of(record, k)->size; ++i) given = given || !math::is_nan(z[i]);
+    return given;
+  }
+  static const Scalar* place_of_row(const Record<Scalar>& record, std::size_t k) {
+    const Scalar* place = record.place != nullptr ? record.place + k * kMaxPlace : nullptr;
+    return place != nullptr && math::is_nan(place[0]) ? nullptr : place;
+  }
+  static std::shared_ptr<const AnySensor<Scalar>> borrowed(const AnySensor<Scalar>& sensor) {
+    return std::shared_ptr<const AnySensor<Scalar>>(std::shared_ptr<void>(), &sensor);
+  }
+  static Sensor placed(const std::shared_ptr<const AnySensor<Scalar>>& sensor,
+                       const Scalar* place) {
+    Sensor there;
+    there.model = std::static_pointer_cast<const SensorFor<Scalar, N>>(sensor);
+    there.moved = place != nullptr;
+    for (int i = 0; there.moved && i < sensor->place; ++i) there.place[i] = place[i];
+    return there;
+  }
+  static typename Sensor::Measurement to_measurement(const Scalar* z,
+                                                     const AnySensor<Scalar>& sensor) {
+    typename Sensor::Measurement value = Sensor::Measurement::Zero();
+    for (int i = 0; i < sensor.size; ++i) value(i) = z[i];
+    return value;
+  }
 
   Status take(const Record<Scalar>& record, std::size_t k, Report<Scalar>& report, bool& too_late) {
     const Scalar* input = record.input;
     if (input != nullptr) input += k * static_cast<std::size_t>(inputs());
     Status status = predict(record.dt[k], input);
     if (status != Status::kOk) return status;
-    const std::size_t which =
-        record.sensor != nullptr ? static_cast<std::size_t>(record.sensor[k]) : 0;
-    const auto& sensor = record.sensors[which];
-    const Scalar* z = record.z + k * record.width;
-    bool given = false;
-    for (int i = 0; i < sensor->size; ++i) given = given || !math::is_nan(z[i]);
-    if (given) {
-      const Scalar* place = record.place != nullptr ? record.place + k * kMaxPlace : nullptr;
-      if (place != nullptr && math::is_nan(place[0])) place = nullptr;
+    if (measured(record, k)) {
       const Scalar age = record.age != nullptr ? record.age[k] : Scalar(0);
-      report = update(z, sensor, place, age);
+      const Scalar* z = record.z + k * record.width;
+      report = update(z, sensor_of(record, k), place_of_row(record, k), age);
       too_late = report.status == Status::kTimeBackwards && age > Scalar(0);
       if (too_late) report = Report<Scalar>();
       if (report.status != Status::kOk) return report.status;

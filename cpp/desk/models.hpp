@@ -61,14 +61,17 @@ template <class Scalar, int N>
 struct ProcessFor : AnyProcess<Scalar> {
   using Input = Vector<Scalar, kMaxInputs>;
   const bool translates;  ///< as ProcessModel's kTranslation
+  const bool linear;      ///< as ProcessModel's kLinear
 
-  ProcessFor(int position, int u, bool moves_all_alike)
-      : AnyProcess<Scalar>(N, position, u), translates(moves_all_alike) {}
+  ProcessFor(int position, int u, bool moves_all_alike, bool in_x)
+      : AnyProcess<Scalar>(N, position, u), translates(moves_all_alike), linear(in_x) {}
 
   virtual Status predict(const AnyLinearisation<Scalar>& how, Belief<Scalar, N>& belief, Scalar dt,
                          const Input& input) const = 0;
   virtual Scalar position_variance(const Belief<Scalar, N>& belief, Scalar dt,
                                    const Input& input) const = 0;
+  virtual Vector<Scalar, N> residual(const Vector<Scalar, N>& a,
+                                     const Vector<Scalar, N>& b) const = 0;
 };
 
 /// The process of a filter: the model and what drives it.
@@ -83,6 +86,9 @@ struct RuntimeProcess {
 
   Scalar position_variance(const Belief<Scalar, N>& belief, Scalar dt) const {
     return model->position_variance(belief, dt, input);
+  }
+  Vector<Scalar, N> residual(const Vector<Scalar, N>& a, const Vector<Scalar, N>& b) const {
+    return model->residual(a, b);
   }
   bool translates() const { return model->translates; }
   int position_states() const { return model->position_states; }
@@ -251,7 +257,8 @@ class ProcessOf final : public ProcessFor<typename Process::Scalar, Process::kSt
 
   /// `count`: how many of the numbers of the model's input count.
   explicit ProcessOf(const Process& process, int count = kInputs)
-      : Base(Process::kPosition, count, Process::kTranslation), process_(process) {}
+      : Base(Process::kPosition, count, Process::kTranslation, Process::kLinear),
+        process_(process) {}
 
   const Process& process() const { return process_; }
 
@@ -281,6 +288,10 @@ class ProcessOf final : public ProcessFor<typename Process::Scalar, Process::kSt
       predict_by_points(points, driven_process, later, dt, IsLinear<false>());
       return kStates > 1 ? later.P(0, 0) + later.P(kStates > 1, kStates > 1) : later.P(0, 0);
     }
+  }
+  Vector<Scalar, kStates> residual(const Vector<Scalar, kStates>& a,
+                                   const Vector<Scalar, kStates>& b) const override {
+    return process_.residual(a, b);
   }
 
   void f(const Scalar* x, Scalar dt, const Scalar* input, Scalar* out) const override {

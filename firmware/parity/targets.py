@@ -239,3 +239,17 @@ SLATF_TARGETS = (
 
 #: The same for hulls, guidance, control and the model-aided filter.
 VEHICLE_TARGETS = tuple(replace(target, header="vehicle_replay.hpp") for target in TARGETS)
+
+
+# ---- A fixed lag ---------------------------------------------------------------------------------
+
+#: Predictions that the program of ``smoother_replay.hpp`` looks back.
+LAG = 12
+
+#: The same for the fixed lag, which is compiled where a compiler or a library may make a
+#: difference.
+SMOOTHER_TARGETS = tuple(
+    replace(target, header="smoother_replay.hpp")
+    for target in TARGETS
+    if target.name in ("gcc-O3-march=native", "atmega2560-ide", "cortex-m4f")
+)

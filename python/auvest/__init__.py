@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from auvest.filters import RobustEkf as RobustEkf
     from auvest.filters import RobustUkf as RobustUkf
     from auvest.filters import RunResult as RunResult
+    from auvest.filters import SmoothResult as SmoothResult
     from auvest.filters import Ukf as Ukf
     from auvest.filters.ckf import Ckf as Ckf
     from auvest.intervals import CovarianceBudget as CovarianceBudget
@@ -121,6 +122,7 @@ else:
         "RobustEkf": "filters",
         "RobustUkf": "filters",
         "RunResult": "filters",
+        "SmoothResult": "filters",
         "SelfTestPart": "_core",
         "SelfTestResult": "_core",
         "SlatRun": "slat",

@@ -19,10 +19,13 @@ EQUATIONS = tomllib.loads((ROOT / "tests/equations.toml").read_text())
 COMPUTED = {label: entry["code"] for label, entry in EQUATIONS.items() if "code" in entry}
 LAST_NUMBER = {"AUKF": 12, "SLATF": 65, "MEKF": 20}  # of each paper
 # Where this project derives its own.
-OWN = {"UKF": "ukf.md", "HULL": "vehicle.md", "GUIDE": "guidance.md", "CONTROL": "guidance.md"}
+OWN = {
+    "UKF": "ukf.md", "HULL": "vehicle.md", "GUIDE": "guidance.md", "CONTROL": "guidance.md",
+    "SMO": "smoother.md",
+}  # fmt: skip
 
 # Also what is no label but was meant as one: "[SLATF 57, 58]", or one that a line break cuts.
-LABEL = re.compile(r"\[(?:AUKF|SLATF|MEKF|UKF|HULL|GUIDE|CONTROL)\b(?:[^\]\n]*\])?")
+LABEL = re.compile(r"\[(?:AUKF|SLATF|MEKF|UKF|HULL|GUIDE|CONTROL|SMO)\b(?:[^\]\n]*\])?")
 # Those that a // comment begins with: none where it is ///.
 OPENING = re.compile(rf"\s*(?:{LABEL.pattern}\s*)*")
 OLD_FORM = re.compile(r"\bEqs?\.|\(\d+\)-\(\d+\)")

@@ -30,6 +30,7 @@
 #include "auvest/filters/predict_within.hpp"
 #include "auvest/filters/robust.hpp"
 #include "auvest/filters/robust_ekf.hpp"
+#include "auvest/filters/smoother.hpp"
 #include "auvest/filters/ukf.hpp"
 #include "auvest/guidance/adaptive_line_of_sight.hpp"
 #include "auvest/guidance/circle.hpp"

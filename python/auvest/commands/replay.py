@@ -7,6 +7,10 @@ track as TUM text, a figure, one self-contained HTML report and results.json.
 The log is checked on the way as 'auvest check' does it, and the result has a verdict: sound,
 doubtful or not to be trusted, with the reason; no truth is looked at for it.
 
+With --smooth it goes back over the log from its end: tables, figures and report then have two
+tracks, that of the filter and the smoothed one, and smoothed.tum is the other as TUM text. --lag is
+what a craft would know so much later on the way.
+
 Examples
 --------
   auvest import goats14 data/goats14 logs
@@ -15,13 +19,17 @@ Examples
 
   auvest replay logs/goats14 --config goats14 --kernel huber --set ranges.sigma_m=2.5
 
+  auvest replay logs/goats14 --config goats14 --smooth
+
   auvest replay logs/robot* --filter ekf --json --quiet | jq '.logs[].rmse_m'
 """
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
+import typer
 from rich.markup import escape
 
 from auvest.commands import log_options, options
@@ -34,6 +42,20 @@ from auvest.logs import LogFolder
 from auvest.replay import Result
 from auvest.replay import replay as run_replay
 
+Smooth = Annotated[
+    bool, typer.Option("--smooth", help="Go back over each log with what came later.")
+]
+Lag = Annotated[
+    float | None,
+    typer.Option(
+        "--lag",
+        help="With --smooth: only with what came within so many seconds.",
+        metavar="S",
+        callback=options.not_negative,
+        show_default="everything that came later",
+    ),
+]
+
 
 def command(
     logs: log_options.Logs,
@@ -41,6 +63,8 @@ def command(
     config: log_options.Config = None,
     changes: log_options.Set = None,
     kernel: log_options.KernelOption = None,
+    smooth: Smooth = False,
+    lag_s: Lag = None,
     output: options.Output = Path("auvest-output/replay"),
     force: options.Force = False,
     as_json: options.Json = False,
@@ -48,6 +72,8 @@ def command(
 ) -> None:
     """Replay; the help text is the module's."""
     terminal = Terminal(as_json=as_json, quiet=quiet)
+    if lag_s is not None and not smooth:
+        raise typer.BadParameter("needs --smooth.", param_hint="'--lag'")
     with terminal.usage_errors():
         settings = log_options.settings_of(config, changes, kernel)
         folders = [LogFolder(path, reading=settings.reading) for path in logs]
@@ -65,7 +91,13 @@ def command(
         ):
             try:
                 result = run_replay(
-                    folder, settings, filter_name=filter_name, folder=target.part, progress=progress
+                    folder,
+                    settings,
+                    filter_name=filter_name,
+                    folder=target.part,
+                    progress=progress,
+                    smooth=smooth,
+                    lag_s=lag_s,
                 )
             except FilterError as error:
                 terminal.fail(f"{name}: {error}", ExitCode.FAILED)
@@ -111,6 +143,9 @@ def _show(terminal: Terminal, result: Result, folder: Path) -> None:
     terminal.result(
         f"tables    {shown(folder)}: estimates, measurements, errors as .csv and .parquet"
     )
-    terminal.result(f"track     {shown(folder / 'trajectory.tum')}\n")
+    terminal.result(f"track     {shown(folder / 'trajectory.tum')}")
+    if "smoothed" in result.numbers:
+        terminal.result(f"smoothed  {shown(folder / 'smoothed.tum')}")
+    terminal.result("")
     for warning in report.warnings(result):
         terminal.warn(f"{result.name}: {warning}")

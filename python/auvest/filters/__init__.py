@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from auvest.filters._base import GaussianFilter, Residual, Sensors
 from auvest.filters.ekf import Ekf, RobustEkf
-from auvest.filters.results import Mixture, Report, RunResult
+from auvest.filters.results import Mixture, Report, RunResult, SmoothResult
 from auvest.filters.ukf import Aukf, RobustUkf, Ukf
 
 __all__ = [
@@ -18,5 +18,6 @@ __all__ = [
     "RobustUkf",
     "RunResult",
     "Sensors",
+    "SmoothResult",
     "Ukf",
 ]

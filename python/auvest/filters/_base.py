@@ -7,7 +7,7 @@ understand comes back here, to be converted or refused in words.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, NoReturn, TypeAlias
 
@@ -38,7 +38,7 @@ from auvest._core import Convergence, Decision, Status
 from auvest._interrupts import first_slice, in_slices
 from auvest._state import describe, pack, require, unpack
 from auvest.errors import FilterError, Interrupted
-from auvest.filters.results import Mixture, Report, RunResult
+from auvest.filters.results import Mixture, Report, RunResult, SmoothResult
 from auvest.intervals import FixedInterval, IntervalPolicy, MahalanobisInterval, core_interval
 from auvest.kernels import Kernel, KernelName, RejectionStreak, Unit, as_kernel, core_kernel
 from auvest.models import SENSORS, LeaderRange, MeasurementModel, ProcessModel, from_description
@@ -60,6 +60,8 @@ _POSITION = ("x_m", "y_m", "z_m")
 _REPORT = ("innovation", "S", "standardised", "weight")
 _LARGEST_REPORT = 6  # numbers of a measurement
 _RING = 8  # components, at least
+#: Rows that are smoothed at once: of any filter of the core, and of one that calls Python.
+_BLOCK, _SLOW_BLOCK = 8192, 64
 _STATUSES = {int(status) for status in Status.__members__.values()}
 _DECISIONS = {int(decision) for decision in Decision.__members__.values()}
 
@@ -558,6 +560,192 @@ class GaussianFilter:
             results so far, and the filter stays at their last row.
         """
         as_flag("covariance", covariance)
+        record, handles = self._as_record(z, dt, input, sensor, place, age_s, reference)
+        count = len(record["z"])
+        before = self._before_functions()
+        with self._taken() as core:
+            done, status, columns, interrupted = in_slices(
+                count,
+                8 if self._slow else first_slice(),
+                lambda first, end: core.run(rows_of(record, first, end), handles, covariance),
+                Status.ok,
+            )
+        if status == Status.ok:
+            self._require_functions_done(before)
+        result = RunResult(**self._asked_for(columns, done, covariance=covariance))
+        if status != Status.ok:
+            self._raise_at("run", status, done, result, record, sensor, given_dt=dt is not None)
+        if interrupted:
+            raise Interrupted(result)
+        return result
+
+    def smooth(
+        self,
+        z: npt.ArrayLike,
+        *,
+        dt: npt.ArrayLike | None = None,
+        input: npt.ArrayLike | None = None,
+        sensor: str | MeasurementModel | Sequence[str] | None = None,
+        place: npt.ArrayLike | None = None,
+        age_s: npt.ArrayLike | None = None,
+        reference: npt.ArrayLike | None = None,
+        covariance: bool = True,
+        lag_s: float | None = None,
+    ) -> SmoothResult:
+        """Run a record and go back over it: each row with what the later ones know.
+
+        The filter ends where :meth:`run` would leave it, and takes each row twice. Measurements
+        have the weights that the filter gave them; each counts at its own time, a late one too.
+        Beside its result the memory of a few thousand rows is used, however many there are.
+
+        Parameters
+        ----------
+        z, dt, input, sensor, place, age_s, reference
+            As for :meth:`run`.
+        covariance : bool
+            Whether ``P``, ``S`` and ``smoothed_P`` are recorded.
+        lag_s : float, optional
+            Each row knows what came within this time after it, s, as if it were estimated so much
+            later on the way; default: everything.
+
+        Returns
+        -------
+        SmoothResult
+
+        Raises
+        ------
+        ValueError, TypeError, FilterError, Interrupted
+            As :meth:`run` does; ``partial`` holds what the filter did, not smoothed.
+        """
+        as_flag("covariance", covariance)
+        lag = None if lag_s is None else as_number("lag_s", lag_s, "not negative")
+        record, handles = self._as_record(z, dt, input, sensor, place, age_s, reference)
+        count = len(record["z"])
+        size = _SLOW_BLOCK if self._slow else _BLOCK
+        starts = range(0, count, size)
+        whole: dict[str, Any] = {}
+        marks: list[_Filter[Any]] = []
+        first_interval = self._filter.interval
+        before = self._before_functions()
+        with self._taken() as core:
+            status, done, interrupted = Status.ok, 0, False
+            for first in starts:
+                end = min(count, first + size)
+                marks.append(core.copy())
+                some, status, columns, interrupted = in_slices(
+                    end - first,
+                    8 if self._slow else first_slice(),
+                    lambda a, b, first=first: core.run(  # type: ignore[misc]
+                        rows_of(record, first + a, first + b), handles, covariance
+                    ),
+                    Status.ok,
+                )
+                for name, column in columns.items():
+                    if name not in whole:
+                        there = count if len(column) >= end - first else 0
+                        whole[name] = np.empty((there, *column.shape[1:]), column.dtype)
+                    if len(whole[name]):
+                        whole[name][first : first + some] = column[:some]
+                done = first + some
+                if status != Status.ok or interrupted:
+                    break
+        kept = self._asked_for(whole, done, covariance=covariance)
+        if status != Status.ok:
+            result = RunResult(**kept)
+            self._raise_at("smooth", status, done, result, record, sensor, given_dt=dt is not None)
+        self._require_functions_done(before)
+        if interrupted:
+            raise Interrupted(RunResult(**kept))
+        if dt is None:
+            record["dt"] = np.concatenate([[first_interval], whole["interval_s"][:-1]]).astype(
+                self._dtype
+            )
+        x = np.empty((count, len(self._process.state)), self._dtype)
+        P = np.empty((count if covariance else 0, *x.shape[1:], x.shape[1]), self._dtype)
+        reach = lookahead(record, self.late_s, lag)
+        known: Any = None  # of the end of a block
+        for k, first in reversed(list(enumerate(starts))):
+            end = min(count, first + size)
+            rows = rows_of(record, first, reach(end))
+            smoothed, spreads, known = self._back(marks[k], rows, handles, end - first, known, lag)
+            x[first:end] = smoothed
+            if covariance:
+                P[first:end] = spreads
+        return SmoothResult(**{**kept, "smoothed_x": x, "smoothed_P": P if covariance else None})
+
+    def _back(
+        self,
+        core: _Filter[Any],
+        rows: dict[str, Any],
+        handles: list[Any],
+        count: int,
+        known: Any,
+        lag_s: float | None,
+    ) -> tuple[Floats, Floats, tuple[Floats, Floats]]:
+        """Smooth the first rows: x, P and the belief before them.
+
+        ``core`` is the filter as it was there, ``known`` the belief behind them, or None.
+        """
+        status, x, P, before = core.smooth(
+            rows, handles, count, known, np.nan if lag_s is None else lag_s
+        )
+        require_none_raised()
+        if status != Status.ok:
+            raise FilterError("smooth", status)
+        return x, P, before
+
+    def _asked_for(self, columns: dict[str, Any], done: int, *, covariance: bool) -> dict[str, Any]:
+        """Give the rows that were done of the columns of a result; None: not asked for."""
+        missing = [] if covariance else ["P", "S"]
+        if self._policy is None:
+            missing.append("interval_s")
+        if self.late_s == 0:
+            missing.append("too_late")
+        if self._components == 1:
+            missing += ["convergence", "mixture_size"]
+        return {
+            name: None if column is None or name in missing else column[:done]
+            for name, column in columns.items()
+        }
+
+    def _raise_at(
+        self,
+        action: str,
+        status: Status,
+        row: int,
+        partial: RunResult,
+        record: dict[str, Any],
+        sensor: str | MeasurementModel | Sequence[str] | None,
+        *,
+        given_dt: bool,
+    ) -> NoReturn:
+        """Say why a row of a record cannot be done."""
+        which, place = record["sensor"], record["place"]
+        hint = self._why(
+            status,
+            dt=record["dt"][row] if given_dt else None,
+            z=record["z"][row],
+            sensor=sensor if which is None else np.asarray(sensor)[row].item(),
+            place=None if place is None else place[row],
+        )
+        error = FilterError(action, status, step=row, partial=partial, hint=hint)
+        try:
+            require_none_raised()
+        except Exception as cause:
+            raise error from cause
+        raise error
+
+    def _as_record(
+        self,
+        z: npt.ArrayLike,
+        dt: npt.ArrayLike | None,
+        input: npt.ArrayLike | None,
+        sensor: str | MeasurementModel | Sequence[str] | None,
+        place: npt.ArrayLike | None,
+        age_s: npt.ArrayLike | None,
+        reference: npt.ArrayLike | None,
+    ) -> tuple[dict[str, Any], list[Any]]:
+        """Take the arguments of :meth:`run`: columns for the core, and its sensors."""
         handles, which = self._as_sensor_rows(sensor)
         rows = self._as_measurements(z, handles, which)
         count = len(rows)
@@ -584,53 +772,7 @@ class GaussianFilter:
             "reference": track,
             "sensor": which,
         }
-        before = self._before_functions()
-        with self._taken() as core:
-            done, status, columns, interrupted = in_slices(
-                count,
-                8 if self._slow else first_slice(),
-                lambda first, end: core.run(
-                    {
-                        name: None if column is None else column[first:end]
-                        for name, column in record.items()
-                    },
-                    handles,
-                    covariance,
-                ),
-                Status.ok,
-            )
-        if status == Status.ok:
-            self._require_functions_done(before)
-        for name in ("P", "S") if not covariance else ():
-            columns[name] = None
-        if self._policy is None:
-            columns["interval_s"] = None
-        if self.late_s == 0:
-            columns["too_late"] = None
-        for name in ("convergence", "mixture_size") if self._components == 1 else ():
-            columns[name] = None
-        kept: dict[str, Any] = {
-            key: None if column is None else column[:done] for key, column in columns.items()
-        }
-        result = RunResult(**kept)
-        if status != Status.ok:
-            model = sensor if which is None else np.asarray(sensor)[done].item()
-            hint = self._why(
-                status,
-                dt=None if dt is None else record["dt"][done],
-                z=rows[done],
-                sensor=model,
-                place=None if record["place"] is None else record["place"][done],
-            )
-            error = FilterError("run", status, step=done, partial=result, hint=hint)
-            try:
-                require_none_raised()
-            except Exception as cause:
-                raise error from cause
-            raise error
-        if interrupted:
-            raise Interrupted(result)
-        return result
+        return record, handles
 
     @property
     def _slow(self) -> bool:
@@ -993,6 +1135,30 @@ class GaussianFilter:
             return type(sensor).__name__, sensor
         name = next(iter(self._sensors)) if sensor is None else sensor
         return name, self._sensors[name]
+
+
+def rows_of(record: Mapping[str, Any], first: int, end: int) -> dict[str, Any]:
+    """Give these rows of a record."""
+    return {name: None if rows is None else rows[first:end] for name, rows in record.items()}
+
+
+def lookahead(
+    record: Mapping[str, Any], late_s: float, lag_s: float | None
+) -> Callable[[int], int]:
+    """Say how far a record must be known to smooth its rows up to an end."""
+    count = len(record["dt"])
+    times = np.cumsum(record["dt"], dtype=np.float64)
+
+    def reach(end: int) -> int:
+        if end == count or (late_s == 0 and lag_s is None):
+            return end
+        # A measurement belongs to the prediction that ended nearest to it.
+        late = 0.0 if late_s == 0 else 1.001 * late_s + float(record["dt"][end])
+        ahead = late + (0.0 if lag_s is None else 1.001 * lag_s)
+        since = times[end - 1] if end > 0 else 0.0
+        return int(np.searchsorted(times, since + ahead, side="right"))
+
+    return reach
 
 
 def _require_correlations(saved: Floats, states: int) -> None:

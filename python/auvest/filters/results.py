@@ -129,3 +129,22 @@ class RunResult(Result):
     too_late: npt.NDArray[np.bool_]
     convergence: npt.NDArray[np.uint8]
     mixture_size: npt.NDArray[np.uint8]
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class SmoothResult(RunResult):
+    """What ``smooth`` returns: what the filter did, and what is known of each row afterwards.
+
+    The columns of :class:`RunResult`, and those of the smoother. Without a lag ``smoothed_P`` is
+    at most ``P``, but before a recovery from lock-out, where ``P`` was too small.
+
+    Attributes
+    ----------
+    smoothed_x : ndarray, shape (T, n)
+        Estimates with all later measurements, or those within the lag.
+    smoothed_P : ndarray, shape (T, n, n)
+        Their covariances [``covariance=True``].
+    """
+
+    smoothed_x: Floats
+    smoothed_P: Floats

@@ -41,6 +41,7 @@ from auvest.replay import tables
 from auvest.replay.config import FilterName, IntervalSettings, Settings
 from auvest.replay.instruments import Instruments, Measured
 from auvest.replay.motion import Motion, Segments, carry, dead_reckon, wrapped
+from auvest.replay.smoothing import Heading, Smoothing, Track
 from auvest.replay.sources import Sources
 from auvest.replay.tables import Batch, Columns
 from auvest.replay.thinning import SAME_S, Thinning
@@ -75,12 +76,16 @@ class Replay(ABC):
     listener : callable, optional
         Gets each stretch of rows before the filter does: the filter, z, and the other arguments of
         its ``run``.
+    smoothing : Smoothing, optional
+        Gets them too; each batch then has its ``track``.
     """
 
     listener: Callable[[GaussianFilter, Rows, Mapping[str, Any]], None] | None = None
     #: Whether the state has a depth.
     spatial = False
     _filter: GaussianFilter
+    #: Gets the same, to go back over it.
+    smoothing: Smoothing | None = None
 
     def __init__(self, log: LogFolder, settings: Settings, filter_name: FilterName) -> None:
         log = _early(log, settings)
@@ -170,10 +175,16 @@ class Replay(ABC):
     @abstractmethod
     def _advance(self, limit: float, *, last: bool) -> Batch: ...
 
-    def _run_rows(self, filter_: GaussianFilter, z: Rows, **rows: Any) -> RunResult:
-        """Take the filter through these rows; who listens gets them first."""
+    def _tell(self, filter_: GaussianFilter, z: Rows, rows: Mapping[str, Any]) -> None:
+        """Give rows to who listens, before the filter gets them."""
         if self.listener is not None:
             self.listener(filter_, z, rows)
+        if self.smoothing is not None:
+            self.smoothing.rows(filter_, z, rows)
+
+    def _run_rows(self, filter_: GaussianFilter, z: Rows, **rows: Any) -> RunResult:
+        """Take the filter through these rows."""
+        self._tell(filter_, z, rows)
         return filter_.run(z, **rows)
 
     def _take(self, name: str, limit: float) -> Rows:
@@ -476,6 +487,10 @@ class Localiser(Replay):
             carry(segments, reckoned, at, truth[:, 0]),
         )
 
+        track = None
+        if self.smoothing is not None:
+            before = (self._x, self._P)
+            track = Track(final, at, before, truth[:, :3], partial(carry, segments), heading_of)
         self._now, self._x, self._P = float(at[-1]), states[-1:], spreads[-1:]
         self._reckoned = reckoned[-1:]
         if self._late_s > 0:
@@ -484,7 +499,7 @@ class Localiser(Replay):
             k = int(np.searchsorted(past_s, self._now - self._late_s, side="right")) - 1
             self._past_s, self._past_x = past_s[max(k, 0) :], past_x[max(k, 0) :]
         self._motion.forget(self._past_s[0] if len(self._past_s) else self._now)
-        estimates = _estimates(at[1:], states[1:], states[1:, 2], spreads[1:], reckoned[1:])
+        estimates = _estimates(at[1:], states[1:], heading_of, spreads[1:], reckoned[1:])
         if self._filter.components > 1:
             said, size = (mixture[name][final] for name in tables.MIXTURE)
             named = {"convergence": tables.CONVERGENCES[said], "mixture_size": size}
@@ -495,6 +510,7 @@ class Localiser(Replay):
             errors=errors,
             ranges_m=came.range_m,
             located=located,
+            track=track,
         )
 
     def _predict_held_out(
@@ -642,15 +658,19 @@ class Tracker(Replay):
         truth = truth[truth[:, 0] >= self.start[0]]
         last_row = np.searchsorted(at, truth[:, 0], side="right") - 1
         nowhere = np.full((len(truth), 2), np.nan)
-        position = self._carry(states, at, truth[:, 0])
+        carried = partial(coast, spatial=self.spatial)
+        course = partial(course_of, velocity=3 if self.spatial else 2)
+        position = carried(states, at, truth[:, 0])
+        track = None
+        if self.smoothing is not None:
+            before = (self._x, self._P)
+            track = Track(np.arange(len(x)), at, before, truth[:, :3], carried, course)
         self._now, self._x, self._P = float(at[-1]), states[-1:], spreads[-1:]
         if self._late_s > 0:
             past_s = np.concatenate([self._past_s, at[:-1]])
             k = int(np.searchsorted(past_s, self._now - self._late_s, side="right")) - 1
             self._past_s = past_s[max(k, 0) :]
             self._past_x = np.concatenate([self._past_x, states[:-1]])[max(k, 0) :]
-        v = 3 if self.spatial else 2
-        course = np.arctan2(states[1:, v + 1], states[1:, v])
         estimates = _estimates(at[1:], states[1:], course, spreads[1:], None)
         if self.spatial:
             depth = (states[1:, 2], spreads[1:, 2, 2])
@@ -660,6 +680,7 @@ class Tracker(Replay):
             measurements=columns,
             errors=self._errors(truth, position, spreads[last_row], nowhere),
             ranges_m=came.range_m,
+            track=track,
         )
 
     def _begin_at_first(
@@ -700,7 +721,7 @@ class Tracker(Replay):
     ) -> None:
         """Write how far the predictions of what the filter did not get were off."""
         held = np.flatnonzero(columns["outcome"] == tables.HELD_OUT)
-        predicted = self._carry(states, at, came.taken_s[held])
+        predicted = coast(states, at, came.taken_s[held], spatial=self.spatial)
         seen = np.where(
             (came.sensor[held] == tables.FIX)[:, None], _pointed(came[held]), _placed(came[held])
         )
@@ -755,9 +776,7 @@ class Tracker(Replay):
                 continue
             sensor = self.instruments.model(tables.FIX, came.noise[k])
             z, place = came.z[k : k + 1, :2], came.place[k : k + 1, :2]
-            if self.listener is not None:
-                row = {"dt": np.array([time - now]), "place": place, "sensor": sensor}
-                self.listener(tracker, z, row)
+            self._tell(tracker, z, {"dt": np.array([time - now]), "place": place, "sensor": sensor})
             tracker.predict(time - now)
             tracker.update(z[0], sensor, place=place[0])
             tracker.feedback()
@@ -773,14 +792,36 @@ class Tracker(Replay):
             columns["near_field"][k] = tracker.near_field
         return np.concatenate(states), np.concatenate(spreads), used
 
-    def _carry(self, states: Rows, at: Rows, time_s: Rows) -> Rows:
-        """Predicted positions at these times, each from the last state before it."""
-        k = np.searchsorted(at, time_s, side="right") - 1
-        dt = (time_s - at[k])[:, None]
-        if self.spatial:
-            return states[k, 0:2] + dt * states[k, 3:5]
-        half_square = 0.5 * dt * dt
-        return states[k, 0:2] + dt * states[k, 2:4] + half_square * states[k, 4:6]
+
+def heading_of(states: Floats, covariance: Floats) -> tuple[Floats, Floats]:
+    """Headings and their standard deviations, rad, of poses."""
+    return states[:, 2], np.sqrt(covariance[:, 2, 2])
+
+
+def course_of(states: Floats, covariance: Floats, velocity: int) -> tuple[Floats, Floats]:
+    """Courses and their standard deviations, rad; of one that stands they are not known.
+
+    ``velocity`` is the place of the first of its components in a state.
+    """
+    x, y = velocity, velocity + 1
+    vx, vy = states[:, x], states[:, y]
+    square = vx * vx + vy * vy
+    across = vy * vy * covariance[:, x, x] - 2 * vx * vy * covariance[:, x, y]
+    across = across + vx * vx * covariance[:, y, y]
+    variance = np.full(len(square), np.nan)
+    np.divide(across, square * square, out=variance, where=square > 0)
+    return np.arctan2(vy, vx), np.sqrt(np.maximum(variance, 0.0))
+
+
+def coast(states: Floats, at: Floats, time_s: Rows, *, spatial: bool) -> Floats:
+    """Predicted positions at these times, each from the last state before it."""
+    k = np.searchsorted(at, time_s, side="right") - 1
+    dt = (time_s - at[k])[:, None]
+    if spatial:
+        return states[k, 0:2] + dt * states[k, 3:5]
+    half_square = 0.5 * dt * dt
+    position: Floats = states[k, 0:2] + dt * states[k, 2:4] + half_square * states[k, 4:6]
+    return position
 
 
 def _pointed(fixes: Measured) -> Rows:
@@ -924,17 +965,12 @@ def replay_of(log: LogFolder, settings: Settings, filter_name: FilterName) -> Re
 
 
 def _estimates(
-    time_s: Floats, states: Floats, heading: Floats, covariance: Floats, reckoned: Floats | None
+    time_s: Floats, states: Floats, heading: Heading, covariance: Floats, reckoned: Floats | None
 ) -> Columns:
     unknown = np.full(len(time_s), np.nan)
     return {
         "time_s": time_s,
-        "x_m": states[:, 0],
-        "y_m": states[:, 1],
-        "heading_rad": heading,
-        "var_x_m2": covariance[:, 0, 0],
-        "cov_xy_m2": covariance[:, 0, 1],
-        "var_y_m2": covariance[:, 1, 1],
+        **tables.pose(states, covariance, *heading(states, covariance)),
         "dead_reckoned_x_m": unknown if reckoned is None else reckoned[:, 0],
         "dead_reckoned_y_m": unknown if reckoned is None else reckoned[:, 1],
     }

@@ -117,6 +117,9 @@ def _tracks(axes: Axes, result: Result) -> None:
         axes.plot(truth["true_x_m"], truth["true_y_m"], "-", color=plots.BLACK, label="truth")
     estimated = estimate["x_m"], estimate["y_m"]
     axes.plot(*estimated, "-", color=plots.BLUE, linewidth=1.2, label="estimate")
+    if "smoothed_x_m" in estimate:
+        smoothed = estimate["smoothed_x_m"], estimate["smoothed_y_m"]
+        axes.plot(*smoothed, "--", color=plots.ORANGE, linewidth=1.2, label="smoothed")
     if len(result.sources):
         axes.plot(*result.sources.T, "^", color=plots.GREEN, linestyle="none", label="beacons")
     plots.style_plane(axes)
@@ -133,6 +136,17 @@ def _errors(pair: tuple[Axes, Axes], result: Result) -> None:
         )  # fmt: skip
         axes.plot(rows["time_s"], rows[f"error_{name}_m"], color=plots.BLUE, linewidth=1.0,
                   label="error")  # fmt: skip
+        if f"smoothed_error_{name}_m" in rows:
+            axes.plot(
+                rows["time_s"], rows[f"smoothed_error_{name}_m"], "--", color=plots.ORANGE,
+                linewidth=1.0, label="smoothed: error",
+            )  # fmt: skip
+            for sign in (-3, 3):
+                axes.plot(
+                    rows["time_s"], sign * rows[f"smoothed_sigma_{name}_m"], ":",
+                    color=plots.ORANGE, linewidth=0.8,
+                    label="smoothed: ±3 sigma" if sign > 0 else None,
+                )  # fmt: skip
         plots.style(axes, ylabel=f"{name} error / m")
     _legend(pair[0])
     pair[1].set_xlabel("time / s")

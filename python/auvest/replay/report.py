@@ -92,6 +92,7 @@ def rows(result: Result) -> list[tuple[str, str]]:
         ("largest error", _metres(n["max_error_m"])),
         ("dead reckoning alone, RMSE", _metres(n["dead_reckoned_rmse_m"])),
         ("truth within 3 sigma", _share(n["inside_3_sigma"])),
+        *_smoothed(n),
         ("held-out measurements, RMSE", _metres(n["held_out_rmse_m"])),
         ("NIS, mean", _nis(n)),
         ("NIS within three sigma, mean", _nis_within(health)),
@@ -106,6 +107,18 @@ def _start(numbers: dict[str, Any]) -> str:
     if numbers["settled_s"] is None:
         return f"{numbers['convergence']} at the end, never settled"
     return f"settled first at {numbers['settled_s']:.1f} s, {numbers['convergence']} at the end"
+
+
+def _smoothed(numbers: dict[str, Any]) -> list[tuple[str, str]]:
+    if "smoothed" not in numbers:
+        return []
+    own = numbers["smoothed"]
+    what = "smoothed" if own["lag_s"] is None else f"smoothed, lag {own['lag_s']:g} s"
+    return [
+        (f"{what}: position RMSE", _metres(own["rmse_m"])),
+        (f"{what}: largest error", _metres(own["max_error_m"])),
+        (f"{what}: truth within 3 sigma", _share(own["inside_3_sigma"])),
+    ]
 
 
 def _metres(value: float | None) -> str:

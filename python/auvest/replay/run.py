@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -17,9 +17,10 @@ from auvest.logs.findings import Finding
 from auvest.logs.origin import local_origin, shifted
 from auvest.replay import checks, tables
 from auvest.replay.config import FilterName, Settings
-from auvest.replay.engine import replay_of
+from auvest.replay.engine import Replay, replay_of
 from auvest.replay.health import Health, Residuals, health
 from auvest.replay.samples import Samples
+from auvest.replay.smoothing import Smoothing
 from auvest.replay.tally import Tally
 
 #: ``progress(done, total)`` in bytes of the log.
@@ -39,7 +40,8 @@ class Result:
     numbers : dict
         The figures of the run, see :class:`auvest.replay.tally.Tally`, and ``late``; of a filter
         with several components ``convergence``, at the end, ``settled_s``, when first, and
-        ``settled_rmse_m``, from then on.
+        ``settled_rmse_m``, from then on; of one that was smoothed ``smoothed``, with ``lag_s``,
+        ``rmse_m``, ``max_error_m`` and ``inside_3_sigma`` of that track.
     estimates, measurements, errors, outliers : Samples
         At most a few thousand rows of each table, for figures; ``outliers`` are measurements with
         less than full weight.
@@ -87,6 +89,8 @@ def replay(
     folder: Path | None = None,
     progress: ProgressCallback | None = None,
     causes: bool = True,
+    smooth: bool = False,
+    lag_s: float | None = None,
 ) -> Result:
     """Replay a log.
 
@@ -105,6 +109,11 @@ def replay(
         Called with the bytes of the log that are read, and all.
     causes : bool
         Whether to look for the cause of what does not fit, which takes some dozens of replays.
+    smooth : bool
+        Whether to go back over it from the end: the tables then have columns ``smoothed_*`` and the
+        track ``smoothed.tum``.
+    lag_s : float, optional
+        With ``smooth``: each estimate knows what came within this time after it, s; default: all.
 
     Returns
     -------
@@ -119,21 +128,26 @@ def replay(
     OSError
         If a file cannot be written.
     """
+    if lag_s is not None and not (smooth and 0 <= lag_s < math.inf):
+        raise ValueError(f"lag_s must be finite, not negative, and with smooth, not {lag_s}")
     name = checks.filter_of(log, settings, filter_name)
     origin = local_origin(log)
     local = shifted(log, origin)
     engine = replay_of(local, settings, name)
     tally, residuals = Tally(), Residuals()
     found: list[Finding] = []
-    estimates, errors = Samples(tables.ESTIMATES), Samples(tables.ERRORS)
+    estimates = Samples(tables.ESTIMATES + (tables.SMOOTHED if smooth else ()))
+    errors = Samples(tables.ERRORS + (tables.SMOOTHED_ERRORS if smooth else ()))
     measurements, outliers = Samples(tables.MEASUREMENTS), Samples(tables.MEASUREMENTS)
     interrupted = False
     with ExitStack() as stack:
-        files = _open(folder, stack)
-        try:
-            held = stack.enter_context(HeldInterrupts())
-            found += checks.files(log, settings)
-            for batch in engine.batches():
+        files = _open(folder, stack, smooth=smooth)
+        if smooth:
+            engine.smoothing = stack.enter_context(Smoothing(folder, lag_s))
+        held = stack.enter_context(HeldInterrupts())
+
+        def take(batches: Iterator[tables.Batch]) -> None:
+            for batch in batches:
                 if origin is not None:
                     batch = tables.moved(batch, origin)
                 with held:  # so that all tables and figures are of the same rows
@@ -147,12 +161,23 @@ def replay(
                     outliers.add(_outliers(batch.measurements))
                 if progress is not None:
                     progress(engine.bytes_read, engine.bytes)
+
+        try:
+            found += checks.files(log, settings)
+            if engine.smoothing is None:
+                take(engine.batches())
+            else:
+                interrupted = _go_forward(engine, engine.smoothing, held, progress)
+                take(engine.smoothing.batches())
             if folder is not None and "truth.csv" in log:
                 _write_truth(log, folder, stack)
-            found += checks.innovations(local, settings, name, residuals, found, causes=causes)
+            if not interrupted:
+                found += checks.innovations(local, settings, name, residuals, found, causes=causes)
         except KeyboardInterrupt:
             interrupted = True
     numbers = tally.numbers()
+    if smooth:
+        numbers["smoothed"] = {"lag_s": lag_s, **tally.smoothed()}
     numbers["origin_m"] = None if origin is None else list(origin)
     if residuals.convergence:
         settled_s = residuals.settled_s
@@ -176,7 +201,25 @@ def replay(
     )
 
 
-def _open(folder: Path | None, stack: ExitStack) -> list[Callable[[tables.Batch], None]]:
+def _go_forward(
+    engine: Replay, smoothing: Smoothing, held: HeldInterrupts, progress: ProgressCallback | None
+) -> bool:
+    """Take the filter through the log; say whether Ctrl-C has ended it, with a whole batch."""
+    try:
+        for batch in engine.batches():
+            with held:
+                smoothing.add(batch)
+            if progress is not None:
+                progress(engine.bytes_read, engine.bytes)
+    except KeyboardInterrupt:
+        smoothing.drop()
+        return True
+    return False
+
+
+def _open(
+    folder: Path | None, stack: ExitStack, *, smooth: bool
+) -> list[Callable[[tables.Batch], None]]:
     if folder is None:
         return []
     from auvest.replay.sink import TableFiles, TumFile  # here, because pyarrow takes long to import
@@ -192,7 +235,10 @@ def _open(folder: Path | None, stack: ExitStack) -> list[Callable[[tables.Batch]
             part.write(getattr(batch, name))
         tum.write(batch.estimates)
 
-    return [write]
+    if not smooth:
+        return [write]
+    smoothed = stack.enter_context(TumFile(folder / "smoothed.tum", prefix="smoothed_"))
+    return [write, lambda batch: smoothed.write(batch.estimates)]
 
 
 def _write_truth(log: LogFolder, folder: Path, stack: ExitStack) -> None:

@@ -59,21 +59,25 @@ class TableFiles(_Sink):
 
 
 class TumFile(_Sink):
-    """A trajectory as TUM text, ``time x y z qx qy qz qw`` per line, for tools such as evo."""
+    """A trajectory as TUM text, ``time x y z qx qy qz qw`` per line, for tools such as evo.
 
-    def __init__(self, path: Path) -> None:
+    ``prefix``: before the names of the columns that it is of.
+    """
+
+    def __init__(self, path: Path, prefix: str = "") -> None:
         super().__init__()
         self.path = path
+        self._prefix = prefix
 
     def write(self, estimates: Columns) -> None:
         """Append the poses of a table of estimates."""
-        heading = estimates["heading_rad"]
+        heading = estimates[f"{self._prefix}heading_rad"]
         zero = np.zeros(len(heading))
         table = pa.table(
             {
                 "time": estimates["time_s"],
-                "x": estimates["x_m"],
-                "y": estimates["y_m"],
+                "x": estimates[f"{self._prefix}x_m"],
+                "y": estimates[f"{self._prefix}y_m"],
                 "z": zero,
                 "qx": zero,
                 "qy": zero,

@@ -28,10 +28,11 @@ OUTCOMES = (ACCEPTED, DOWNWEIGHTED, REJECTED, HELD_OUT, *UNUSED)
 SENSORS = ("range", "fix", "position", "velocity", "depth")
 RANGE, FIX, POSITION, VELOCITY, DEPTH = range(len(SENSORS))
 
-ESTIMATES = (
-    "time_s", "x_m", "y_m", "heading_rad", "var_x_m2", "cov_xy_m2", "var_y_m2",
-    "dead_reckoned_x_m", "dead_reckoned_y_m",
+#: What is known of a pose. The heading of a craft that is tracked is its course.
+POSE = (
+    "x_m", "y_m", "heading_rad", "var_x_m2", "cov_xy_m2", "var_y_m2", "sigma_heading_rad",
 )  # fmt: skip
+ESTIMATES = ("time_s", *POSE, "dead_reckoned_x_m", "dead_reckoned_y_m")
 #: Innovation and weight per number measured; near_field: the innovation is a position error.
 MEASUREMENTS = (
     "time_s", "source", "outcome", "innovation_0", "innovation_1", "sigma_0", "sigma_1",
@@ -49,6 +50,11 @@ ERRORS = (
     "time_s", "true_x_m", "true_y_m", "error_x_m", "error_y_m", "sigma_x_m", "sigma_y_m",
     "dead_reckoned_error_m",
 )  # fmt: skip
+#: What is beside these of a replay that is smoothed.
+SMOOTHED = tuple(f"smoothed_{name}" for name in POSE)
+SMOOTHED_ERRORS = tuple(
+    f"smoothed_{name}" for name in ("error_x_m", "error_y_m", "sigma_x_m", "sigma_y_m")
+)
 
 
 @dataclass(frozen=True)
@@ -57,6 +63,7 @@ class Batch:
 
     ``ranges_m`` are the ranges of the measurements as the log has them, ``located`` says of those
     that were used as ranges whether the belief behind each told where on its circle the craft is.
+    ``track`` is what :mod:`auvest.replay.smoothing` needs of it.
     """
 
     estimates: Columns
@@ -64,12 +71,13 @@ class Batch:
     errors: Columns
     ranges_m: npt.NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
     located: npt.NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, bool))
+    track: Any = None
 
 
 def moved(batch: Batch, origin: tuple[float, float]) -> Batch:
     """Give a batch in coordinates that do not count from a local origin (m)."""
     columns = {"x_m": 0, "y_m": 1, "dead_reckoned_x_m": 0, "dead_reckoned_y_m": 1,
-               "true_x_m": 0, "true_y_m": 1}  # fmt: skip
+               "smoothed_x_m": 0, "smoothed_y_m": 1, "true_x_m": 0, "true_y_m": 1}  # fmt: skip
 
     def shift(table: Columns) -> Columns:
         return {
@@ -78,6 +86,24 @@ def moved(batch: Batch, origin: tuple[float, float]) -> Batch:
         }
 
     return replace(batch, estimates=shift(batch.estimates), errors=shift(batch.errors))
+
+
+def pose(
+    states: npt.NDArray[Any],
+    covariance: npt.NDArray[Any],
+    heading: npt.NDArray[Any],
+    sigma_heading: npt.NDArray[Any],
+) -> dict[str, npt.NDArray[Any]]:
+    """Give the columns of poses whose first two states are the position."""
+    return {
+        "x_m": states[:, 0],
+        "y_m": states[:, 1],
+        "heading_rad": heading,
+        "var_x_m2": covariance[:, 0, 0],
+        "cov_xy_m2": covariance[:, 0, 1],
+        "var_y_m2": covariance[:, 1, 1],
+        "sigma_heading_rad": sigma_heading,
+    }
 
 
 def settled_s(estimates: Columns) -> float:

@@ -30,6 +30,9 @@ class Tally:
         self._reckoned_square = 0.0
         self._worst = 0.0
         self._inside = 0
+        self._smoothed_square = 0.0
+        self._smoothed_worst = 0.0
+        self._smoothed_inside = 0
         self._held = 0
         self._held_square = 0.0
         self._nis = 0.0
@@ -73,6 +76,16 @@ class Tally:
         self._reckoned_square += float(np.square(errors["dead_reckoned_error_m"]).sum())
         inside = (np.abs(x) <= 3 * errors["sigma_x_m"]) & (np.abs(y) <= 3 * errors["sigma_y_m"])
         self._inside += int(inside.sum())
+        if "smoothed_error_x_m" in errors:
+            x, y = errors["smoothed_error_x_m"], errors["smoothed_error_y_m"]
+            square = x * x + y * y
+            self._smoothed_square += float(square.sum())
+            self._smoothed_worst = max(
+                self._smoothed_worst, math.sqrt(float(square.max(initial=0.0)))
+            )
+            inside = np.abs(x) <= 3 * errors["smoothed_sigma_x_m"]
+            inside &= np.abs(y) <= 3 * errors["smoothed_sigma_y_m"]
+            self._smoothed_inside += int(inside.sum())
 
     def numbers(self) -> dict[str, Any]:
         """All figures by name; None where there is nothing to compute one from."""
@@ -96,6 +109,14 @@ class Tally:
             "held_out_rmse_m": self._root(self._held_square, self._held),
             "nis_mean": self._nis / self._nis_count if self._nis_count else None,
             "nis_bounds_95": list(bounds),
+        }
+
+    def smoothed(self) -> dict[str, float | None]:
+        """Give the figures of the smoothed track; None without a truth."""
+        return {
+            "rmse_m": self._root(self._smoothed_square, self._truth),
+            "max_error_m": self._smoothed_worst if self._truth else None,
+            "inside_3_sigma": self._smoothed_inside / self._truth if self._truth else None,
         }
 
     def settled_rmse_m(self) -> float | None:

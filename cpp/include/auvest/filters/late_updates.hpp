@@ -74,6 +74,25 @@ class EventArray {
   int count_;
 };
 
+/// Where in the events what was measured `age` seconds ago belongs: kTimeBackwards where that is
+/// before all of them.
+template <class Events, class Scalar>
+Status place_of(const Events& events, Scalar age, int& at) {
+  if (!math::is_finite(age)) return Status::kNotFinite;
+  if (age < Scalar(0)) return Status::kTimeBackwards;
+  const int count = events.size();
+  at = count;
+  Scalar half = Scalar(0);  // of the first prediction that is kept
+  for (int k = count - 1; k >= 0; --k) {
+    if (events[k].is_update) continue;
+    half = Scalar(0.5) * events[k].dt;
+    if (!(age > half)) break;
+    age = age - events[k].dt;
+    at = k;
+  }
+  return age > half ? Status::kTimeBackwards : Status::kOk;
+}
+
 /// The events since some time ago, and the filter as it was then.
 template <class Filter, class Sensor, class Events_>
 class LateMemory {
@@ -113,7 +132,7 @@ class LateMemory {
   /// nearest to then. Reports what the update did there. On anything but kOk nothing has changed.
   Report update(Filter& filter, const Measurement& z, const Sensor& sensor, Scalar age) {
     int at;
-    const Status status = find(age, at);
+    const Status status = place_of(events_, age, at);
     if (status != Status::kOk) return Report(status);
     return at == events_.size() ? update_now(filter, z, sensor)
                                 : update_late(filter, z, sensor, at);
@@ -123,23 +142,6 @@ class LateMemory {
   const Events& events() const { return events_; }
 
  private:
-  /// Where in the events an age belongs.
-  Status find(Scalar age, int& at) const {
-    if (!math::is_finite(age)) return Status::kNotFinite;
-    if (age < Scalar(0)) return Status::kTimeBackwards;
-    const int count = events_.size();
-    at = count;
-    Scalar half = Scalar(0);  // of the first prediction that is kept
-    for (int k = count - 1; k >= 0; --k) {
-      if (events_[k].is_update) continue;
-      half = Scalar(0.5) * events_[k].dt;
-      if (!(age > half)) break;
-      age = age - events_[k].dt;
-      at = k;
-    }
-    return age > half ? Status::kTimeBackwards : Status::kOk;
-  }
-
   AUVEST_OUTLINE Report update_now(Filter& filter, const Measurement& z, const Sensor& sensor) {
     const Report report = filter.update(z, sensor);
     if (report.status == Status::kOk) remember(events_.size(), z, sensor);

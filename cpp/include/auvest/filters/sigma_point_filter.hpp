@@ -94,6 +94,8 @@ class SigmaPointFilter : public GaussianFilter<SigmaPointFilter<Process, Points_
     return linearise_by_points(points_, model, point, root, z, innovation, a, noise);
   }
 
+  const Points& points() const { return points_; }
+
  private:
   Points points_;
 };
