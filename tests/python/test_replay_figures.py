@@ -60,11 +60,11 @@ def curve(axes: Axes, label: str) -> tuple[list[float], list[float]]:
 def test_the_nis_is_drawn_with_its_one_sided_bound(result: Result) -> None:
     """95 % of a squared normal deviate are below 1.959964^2, of two below -2 ln 0.05."""
     ranges = measured(result, nis=[1.0, 2.0], innovation_0=[1.0, 1.0])
-    (axes,) = figures.nis(ranges).axes
+    axes = figures.overview(ranges).axes[2]
     assert curve(axes, "95 %")[1] == pytest.approx([1.959964**2] * 2, rel=1e-6)
     assert curve(axes, "NIS") == ([0.0, 1.0], [1.0, 2.0])
     fixes = measured(result, nis=[1.0, 2.0], innovation_1=[NAN, 0.1])
-    (axes,) = figures.nis(fixes).axes
+    axes = figures.overview(fixes).axes[2]
     assert curve(axes, "95 %")[1] == pytest.approx([-2 * math.log(0.05)] * 2, rel=1e-12)
 
 
@@ -73,7 +73,7 @@ def test_the_error_is_drawn_with_three_sigma(result: Result) -> None:
         tables.ERRORS, 2, error_x_m=[1.0, -1.0], error_y_m=[2.0, 3.0], sigma_x_m=[0.5, 1.0],
         sigma_y_m=[2.0, 4.0],
     )  # fmt: skip
-    x, y = figures.errors(replace(result, errors=errors)).axes
+    _, x, y = figures.overview(replace(result, errors=errors)).axes
     assert curve(x, "error")[1] == [1.0, -1.0]
     assert curve(y, "error")[1] == [2.0, 3.0]
     for axes, bound in ((x, 3.0), (y, 12.0)):
@@ -93,9 +93,8 @@ def test_innovations_near_the_station_are_not_drawn(result: Result) -> None:
         near_field=[False, True, False],
         outcome=[tables.ACCEPTED, tables.ACCEPTED, tables.REJECTED],
     )
-    along, across = figures.innovations(filled).axes
+    along = figures.overview(filled).axes[1]
     assert curve(along, "innovation") == ([0.0, 2.0], [0.5, -0.25])
-    assert curve(across, "innovation") == ([0.0, 2.0], [0.01, 0.02])
     assert curve(along, "rejected") == ([2.0], [-0.25])
     (band,) = along.collections
     assert band.get_datalim(along.transData).ymax == pytest.approx(6.0)
@@ -107,21 +106,8 @@ def test_gross_errors_do_not_flatten_the_rest(result: Result) -> None:
     columns = {"sigma_0": [1.0] * 4}
     near = measured(result, innovation_0=[0.1, 0.2, 0.3, 23.9], **columns)
     far = measured(result, innovation_0=[0.1, 0.2, 0.3, -24.1], **columns)
-    assert figures.innovations(near).axes[0].get_yscale() == "linear"
-    assert figures.innovations(far).axes[0].get_yscale() == "symlog"
-
-
-def test_weights_are_those_of_the_worse_number(result: Result) -> None:
-    filled = measured(
-        result,
-        weight_0=[1.0, 0.75, 0.5, 0.0],
-        weight_1=[1.0, 0.25, NAN, 0.0],
-        outcome=[tables.ACCEPTED, tables.DOWNWEIGHTED, tables.DOWNWEIGHTED, tables.REJECTED],
-    )
-    (axes,) = figures.weights(filled).axes
-    assert curve(axes, "downweighted") == ([1.0, 2.0], [0.25, 0.5])
-    assert curve(axes, "rejected") == ([3.0], [0.0])
-    assert curve(axes, "weight") == ([0.0, 1.0, 2.0, 3.0], [1.0, 0.75, 0.5, 0.0])
+    assert figures.overview(near).axes[1].get_yscale() == "linear"
+    assert figures.overview(far).axes[1].get_yscale() == "symlog"
 
 
 NUMBERS: dict[str, Any] = {

@@ -107,9 +107,15 @@ class Replay(ABC):
             if limit >= self.start[0] or last:
                 *inner, end = self._stretches(limit)
                 for stop in inner:
-                    yield self._advance(stop, last=False)
-                yield self._advance(end, last=last)
+                    yield self._placed(self._advance(stop, last=False))
+                yield self._placed(self._advance(end, last=last))
                 self._sources.forget(limit)
+
+    def _placed(self, batch: Batch) -> Batch:
+        """Say where the sources of the measurements were, while that is known."""
+        measured = batch.measurements
+        places = self._sources.locate(measured["time_s"], measured["source"].astype(float))
+        return replace(batch, places=places[:, :2])
 
     @property
     def bytes_read(self) -> int:

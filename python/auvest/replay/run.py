@@ -20,6 +20,7 @@ from auvest.replay.config import FilterName, Settings
 from auvest.replay.engine import replay_of
 from auvest.replay.health import Health, Residuals, health
 from auvest.replay.samples import Samples
+from auvest.replay.shown import Shown
 from auvest.replay.tally import Tally
 
 #: ``progress(done, total)`` in bytes of the log.
@@ -41,10 +42,12 @@ class Result:
         with several components ``convergence``, at the end, ``settled_s``, when first, and
         ``settled_rmse_m``, from then on.
     estimates, measurements, errors, outliers : Samples
-        At most a few thousand rows of each table, for figures; ``outliers`` are measurements with
-        less than full weight.
+        At most some ten thousand rows of each table, for figures; ``outliers`` are measurements
+        with less than full weight. Measurements have the columns ``tables.SHOWN``, too.
     sources : ndarray, shape (K, 2)
         Positions of the beacons, m.
+    source_numbers : tuple of int
+        Their numbers in the log.
     health : Health
         Whether it is to be trusted, and why.
     findings : list of Finding
@@ -62,6 +65,7 @@ class Result:
     errors: Samples
     outliers: Samples
     sources: np.ndarray[Any, np.dtype[np.float64]]
+    source_numbers: tuple[int, ...]
     health: Health
     findings: list[Finding]
     interrupted: bool
@@ -126,7 +130,8 @@ def replay(
     tally, residuals = Tally(), Residuals()
     found: list[Finding] = []
     estimates, errors = Samples(tables.ESTIMATES), Samples(tables.ERRORS)
-    measurements, outliers = Samples(tables.MEASUREMENTS), Samples(tables.MEASUREMENTS)
+    columns = tables.MEASUREMENTS + tables.SHOWN
+    measurements, outliers, shown = Samples(columns), Samples(columns), Shown()
     interrupted = False
     with ExitStack() as stack:
         files = _open(folder, stack)
@@ -143,8 +148,9 @@ def replay(
                         write(batch)
                     estimates.add(batch.estimates)
                     errors.add(batch.errors)
-                    measurements.add(batch.measurements)
-                    outliers.add(_outliers(batch.measurements))
+                    measured = shown.of(batch)
+                    measurements.add(measured)
+                    outliers.add(_outliers(measured))
                 if progress is not None:
                     progress(engine.bytes_read, engine.bytes)
             found += checks.innovations(local, settings, name, residuals, found, causes=causes)
@@ -168,6 +174,7 @@ def replay(
         errors=errors,
         outliers=outliers,
         sources=np.array(list(log.beacons().values())).reshape(-1, 2),
+        source_numbers=tuple(log.beacons()),
         health=health(residuals, found),
         findings=found,
         interrupted=interrupted,

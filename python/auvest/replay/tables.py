@@ -29,6 +29,9 @@ MEASUREMENTS = (
     "time_s", "source", "outcome", "innovation_0", "innovation_1", "sigma_0", "sigma_1",
     "near_field", "nis", "weight_0", "weight_1", "recovered", "held_out_error_m",
 )  # fmt: skip
+#: What pages show of a measurement beside its table: the estimate at its time, where its source
+#: was, the range, and the time since the one before that was compared with a prediction.
+SHOWN = ("x_m", "y_m", "place_x_m", "place_y_m", "range_m", "interval_s")
 #: What is beside the estimates of a filter with several components, and by the number of
 #: auvest.Convergence.
 MIXTURE = ("convergence", "mixture_size")
@@ -46,6 +49,7 @@ class Batch:
 
     ``ranges_m`` are the ranges of the measurements as the log has them, ``located`` says of those
     that were used as ranges whether the belief behind each told where on its circle the craft is.
+    ``places`` are x and y of the sources of the measurements, NaN where not known.
     """
 
     estimates: Columns
@@ -53,6 +57,7 @@ class Batch:
     errors: Columns
     ranges_m: npt.NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
     located: npt.NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, bool))
+    places: npt.NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
 
 
 def moved(batch: Batch, origin: tuple[float, float]) -> Batch:
@@ -66,7 +71,12 @@ def moved(batch: Batch, origin: tuple[float, float]) -> Batch:
             for name, values in table.items()
         }
 
-    return replace(batch, estimates=shift(batch.estimates), errors=shift(batch.errors))
+    return replace(
+        batch,
+        estimates=shift(batch.estimates),
+        errors=shift(batch.errors),
+        places=batch.places + origin,
+    )
 
 
 def settled_s(estimates: Columns) -> float:
