@@ -91,11 +91,11 @@ def test_the_worst_verdict_counts() -> None:
 
 def test_a_file_that_no_log_has_is_a_note(tmp_path: Path) -> None:
     arc(tmp_path)
-    (tmp_path / "depth.csv").write_text("time_s,depth_m\n0,5\n")
+    (tmp_path / "battery.csv").write_text("time_s,voltage_v\n0,5\n")
     (tmp_path / "range.csv").write_text("time_s,source,range_m\n0,1,5\n")
     checked = check(tmp_path, Settings())
     assert named(checked) == [
-        ("ignored_file", "depth.csv", None),
+        ("ignored_file", "battery.csv", None),
         ("ignored_file", "range.csv", None),
     ]
     assert "meant to be ranges.csv" in checked.findings[1].message

@@ -168,7 +168,12 @@ def test_a_file_that_is_read_as_a_whole_must_be_small(
 
 
 ALL_COLUMNS = sorted(
-    {(name, column) for name, layouts in FILES.items() for layout in layouts for column in layout},
+    {
+        (name, column)
+        for name, layouts in FILES.items()
+        for layout in layouts
+        for column in layout.columns
+    },
     key=lambda pair: (pair[0], pair[1].name),
 )
 
@@ -179,7 +184,7 @@ ALL_COLUMNS = sorted(
 def test_the_limits_of_a_column_are_read_and_nothing_beyond(
     tmp_path: Path, name: str, column: Column
 ) -> None:
-    layout = next(layout for layout in FILES[name] if column in layout)
+    layout = next(one.columns for one in FILES[name] if column in one.columns)
     header = ",".join(other.name for other in layout)
 
     def table(value: float) -> Path:
@@ -292,17 +297,20 @@ LAYOUT = {
     "ranges.csv": HEAD + "1,0,5\n",
     "fixes.csv": "time_s,source,range_m,bearing_rad\n1,0,5,0\n",
     "beacons.csv": "source,x_m,y_m\n0,0,0\n",
+    "compass.csv": "time_s,heading_rad\n0,0\n",
+    "velocities.csv": "time_s,forward_m_s,left_m_s,heading_rad\n0,0,0,0\n",
 }
 
 
 @pytest.mark.parametrize(
     ("files", "words"),
     [
-        ("odometry beacons", "neither ranges.csv nor fixes.csv"),
+        ("odometry beacons", "neither ranges.csv nor fixes.csv nor positions.csv"),
         ("ranges beacons", "no odometry.csv"),
         ("odometry ranges", "where are the sources"),
-        ("ranges fixes beacons", "one log is for one filter"),
-        ("odometry fixes beacons", "tracked craft"),
+        ("ranges fixes beacons", "has ranges.csv but no odometry.csv"),
+        ("fixes compass beacons", "has compass.csv but no odometry.csv"),
+        ("odometry ranges beacons velocities", "has odometry.csv and velocities.csv"),
     ],
 )
 def test_a_folder_must_have_what_a_log_needs(tmp_path: Path, files: str, words: str) -> None:

@@ -35,6 +35,7 @@ def samples(names: tuple[str, ...], rows: int, **columns: list[Any]) -> Samples:
     table |= {"time_s": np.arange(float(rows)), "near_field": np.zeros(rows, bool)}
     if "outcome" in names:
         table["outcome"] = np.full(rows, tables.ACCEPTED, "U12")
+        table["sensor"] = np.full(rows, "range")
     table |= {name: np.array(values) for name, values in columns.items()}
     made = Samples(names)
     made.add(table)
@@ -122,6 +123,7 @@ NUMBERS: dict[str, Any] = {
     "before_start": 5,
     "after_end": 6,
     "no_position": 7,
+    "too_short": 3,
     "recovered": 8,
     "near_field": 9,
     "rmse_m": 0.12345,
@@ -175,6 +177,7 @@ def test_what_was_not_used_in_words(result: Result) -> None:
         "Measurements: 5 not used, taken before the start of the run.",
         "Measurements: 6 not used, taken after the last line of the odometry.",
         "Measurements: 7 not used, the position of the source is not known at that time.",
+        "Measurements: 3 not used, the range is shorter than the difference in depth.",
     ]
     document = replace(result, numbers=NUMBERS, interrupted=True).document()
     assert document["interrupted"] is True

@@ -148,7 +148,7 @@ def test_zoom_moves_all_plots(walked: tuple[Result, str, dict[str, Any]]) -> Non
     }
     for name, window in windows.items():
         seen = found["seen"][name]
-        ids = ["error-x", "error-y", "sigma", "innovation-0-0", "nis", "weight", "interval"]
+        ids = ["error-x", "error-y", "sigma", "innovation-range-0-0", "nis", "weight", "interval"]
         assert list(seen["charts"]) == ids
         for one in (*seen["charts"].values(), seen["map"]):
             assert (one["from"], one["to"]) == pytest.approx(window, abs=1e-9), name
@@ -170,7 +170,7 @@ def test_the_slider_and_the_keys_move_all_plots(
         assert seen["map"]["at"] == [pytest.approx([known["x_m"], known["y_m"]], abs=1e-5)]
         expected = {
             "sigma": known["var_x_m2"] ** 0.5,
-            "innovation-0-0": measured["innovation_0"][k],
+            "innovation-range-0-0": measured["innovation_0"][k],
             "nis": measured["nis"][k],
             "weight": 1.0,
             "interval": 1.0,
@@ -200,7 +200,7 @@ def test_all_of_it_is_reached_by_the_keyboard_in_order(
     assert seen["order"] == [
         "time", "in", "out", "earlier", "later", "all",
         "nearer", "farther", "fit", "map", "checkbox", "checkbox", "checkbox", "checkbox",
-        "error-x", "error-y", "sigma", "innovation-0-0", "nis", "weight", "interval",
+        "error-x", "error-y", "sigma", "innovation-range-0-0", "nis", "weight", "interval",
     ]  # fmt: skip
     assert seen["nameless"] == 0
 

@@ -152,19 +152,33 @@ class _Heard:
         key = json.dumps(describe(model))
         self._sensors.setdefault(key, model)
         which = list(self._sensors).index(key)
+        if "age_s" in rows:
+            raise ValueError("a record has no late measurements: latency_s is for auvest replay")
         z = np.reshape(z, (len(z), -1))
         driven = rows.get("input", np.empty((len(z), 0)))
-        self._parts.append((np.full(len(z), which), rows["dt"], z, driven, rows["place"]))
+        place = rows.get("place", np.empty((len(z), 0)))
+        self._parts.append((np.full(len(z), which), rows["dt"], z, driven, place))
         self._count += len(z)
 
     def record(self) -> Record:
         if self._start is None:
             raise ValueError("the log has no row for a filter")
-        which, *columns = (np.concatenate(part) for part in zip(*self._parts, strict=True))
+        which, *columns = (_joined(part) for part in zip(*self._parts, strict=True))
         dt, z, driven, place = (column[: self._most].astype(np.float32) for column in columns)
         return Record(
             self._start, tuple(self._sensors.values()), which[: self._most], dt, z, driven, place
         )
+
+
+def _joined(parts: Sequence[npt.NDArray[Any]]) -> npt.NDArray[Any]:
+    """Put rows after each other; NaN behind those of sensors with fewer numbers."""
+    if parts[0].ndim == 1:
+        return np.concatenate(parts)
+    width = max(part.shape[1] for part in parts)
+    filled = (
+        np.pad(part, ((0, 0), (0, width - part.shape[1])), constant_values=np.nan) for part in parts
+    )
+    return np.concatenate(list(filled))
 
 
 def in_float32(filter_: GaussianFilter) -> GaussianFilter:

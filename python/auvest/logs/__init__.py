@@ -6,8 +6,8 @@
 
 from __future__ import annotations
 
-from auvest.logs.layout import FILES, Column
+from auvest.logs.layout import FILES, Column, Layout
 from auvest.logs.merge import Stream, merge
 from auvest.logs.reader import CsvTable, LogError, LogFolder
 
-__all__ = ["FILES", "Column", "CsvTable", "LogError", "LogFolder", "Stream", "merge"]
+__all__ = ["FILES", "Column", "CsvTable", "Layout", "LogError", "LogFolder", "Stream", "merge"]

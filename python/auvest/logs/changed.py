@@ -28,9 +28,8 @@ class ChangedTable(CsvTable):
     """
 
     def __init__(self, table: CsvTable, change: Change) -> None:
-        self.path, self.columns, self.bytes, self.bytes_read = (
-            table.path, table.columns, table.bytes, 0,
-        )  # fmt: skip
+        self.path, self.name, self.columns = table.path, table.name, table.columns
+        self.ignored, self.bytes, self.bytes_read = table.ignored, table.bytes, 0
         self._table = table
         self._change = change
 
@@ -48,14 +47,17 @@ class HeldTable(CsvTable):
     ----------
     path : Path
         The file.
+    name : str
+        Which file of a log it is.
     columns : tuple of Column
         Its layout.
     rows : ndarray
         The rows.
     """
 
-    def __init__(self, path: Path, columns: tuple[Column, ...], rows: Rows) -> None:
-        self.path, self.columns, self.bytes, self.bytes_read = path, columns, rows.nbytes, 0
+    def __init__(self, path: Path, name: str, columns: tuple[Column, ...], rows: Rows) -> None:
+        self.path, self.name, self.columns = path, name, columns
+        self.ignored, self.bytes, self.bytes_read = [], rows.nbytes, 0
         self._rows = rows
 
     def chunks(self) -> Iterator[tuple[Rows, int]]:
@@ -76,7 +78,7 @@ class ChangedLog(LogFolder):
     """
 
     def __init__(self, log: LogFolder, changes: Mapping[str, Change]) -> None:
-        self.path = log.path
+        self.path, self.frame = log.path, log.frame
         self.tables = {
             name: ChangedTable(table, changes[name]) if name in changes else table
             for name, table in log.tables.items()
@@ -97,16 +99,18 @@ class HeldLog(LogFolder):
     """
 
     def __init__(self, log: LogFolder, lines: int, start: tuple[float, ...] | None = None) -> None:
-        self.path = log.path
+        self.path, self.frame = log.path, log.frame
         self.tables = {
-            name: HeldTable(table.path, table.columns, _first(table, lines))
+            name: HeldTable(table.path, name, table.columns, _first(table, lines))
             for name, table in log.tables.items()
             if name != "truth.csv"
         }
-        if start is not None and "start.csv" not in self.tables:
-            (layout,) = FILES["start.csv"]
+        said = self.tables.get("start.csv")
+        if start is not None and (said is None or "heading_rad" not in said.names):
+            columns = FILES["start.csv"][0].columns
             rows = np.array([start], dtype=np.float64)
-            self.tables["start.csv"] = HeldTable(log.path / "start.csv", layout, rows)
+            path = log.path / "start.csv"
+            self.tables["start.csv"] = HeldTable(path, "start.csv", columns, rows)
 
 
 def _first(table: CsvTable, lines: int) -> Rows:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -151,7 +151,7 @@ class FileSeen:
 
     def __init__(self, table: CsvTable, reorder_s: float) -> None:
         self.table = table
-        self.name = table.path.name
+        self.name = table.name
         self.lines = 0
         self.first_s = math.nan
         self.last_s = math.nan
@@ -225,6 +225,9 @@ class FileSeen:
         moving = np.zeros(len(step), bool)
         if self.name == "odometry.csv":
             moving = self._drive(rows, step)
+        if "heading_rad" in self.table.names:
+            turned = np.angle(np.exp(1j * np.diff(self.table.column(rows, "heading_rad"))))
+            self._turns += _middle(np.abs(turned)[step > 0] / step[step > 0])
         # Several leaders stand at one time.
         counted = step[step > 0] if self.name == "leaders.csv" else step
         if len(counted):
@@ -241,17 +244,21 @@ class FileSeen:
     def _drive(self, rows: Rows, step: Rows) -> Any:
         """Add up what the odometry says; whether the craft moves during each step."""
         known = step > 0
-        if "turn_rad" in self.table.names:
-            length = np.hypot(rows[1:, 1], rows[1:, 2])
+        table = self.table
+        if "forward_m" in table.names:
+            length = np.hypot(rows[1:, 1], table.column(rows[1:], "left_m", 0.0))
             self.path_m += float(length.sum())
-            self._turns += _middle(np.abs(rows[1:, 3])[known] / step[known])
+            turned = table.column(rows[1:], "turn_rad", 0.0)
+            self._turns += _middle(np.abs(turned)[known] / step[known])
             # An increment says what the craft did all through its step, unless it is far too short.
             usual = float(np.median(length[known] / step[known])) if known.any() else 0.0
             self._speeds.append(usual)
             return length < 0.25 * usual * step
         self.path_m += float((np.abs(rows[:-1, 1]) * step).sum())
-        self._turns += _middle(np.abs(rows[1:, 2]))
-        return (rows[:-1, 1] != 0) | (rows[:-1, 2] != 0)
+        sideways = table.column(rows, "left_m_s", 0.0)
+        rate = table.column(rows, "yaw_rate_rad_s", 0.0)
+        self._turns += _middle(np.abs(rate[1:]))
+        return (rows[:-1, 1] != 0) | (rate[:-1] != 0) | (sideways[:-1] != 0)
 
     def document(self) -> dict[str, Any]:
         """For JSON."""
@@ -314,7 +321,7 @@ class Survey:
                 "has no line below the header: the craft would stand still",
                 cause="no_odometry",
             )
-        if "turn_rad" in odometry.table.names:
+        if "forward_m" in odometry.table.names:
             return
         moved = [seen for name, seen in self.files.items() if name != "leaders.csv" and seen.lines]
         first = min(seen.first_s for seen in moved)
@@ -347,7 +354,8 @@ def survey(log: LogFolder, limits: Limits) -> Survey:
         files[name] = FileSeen(table, limits.reorder_s)
         for rows, first in table.chunks():
             files[name].add(rows, first)
-    found = list(ignored_files(log.path))
+    read = {table.path.name for table in log.tables.values()}
+    found = [*ignored_files(log.path, read), *_ignored_columns(log)]
     units = list(_units(files, limits))
     found += units
     found += _clocks(files)
@@ -367,10 +375,29 @@ def from_error(error: LogError) -> Finding:
     return finding(error.cause, message.lstrip(",: "), file=file, line=error.line)
 
 
-def ignored_files(folder: Path) -> Iterator[Finding]:
-    """Name the tables in a log's folder that no log has."""
+def _ignored_columns(log: LogFolder) -> Iterator[Finding]:
+    """Name the columns that are of no use."""
+    for table in log.tables.values():
+        others = [one for one in log.tables.values() if one.path == table.path]
+        unused = [name for name in table.ignored if all(name in one.ignored for one in others)]
+        if table is not others[0]:  # said already
+            continue
+        turned: list[str] = []
+        if table.name == "odometry.csv" and "compass.csv" in log:
+            turned = sorted({"turn_rad", "yaw_rate_rad_s", "heading_rad"} & set(table.names))
+            unused = [*unused, *turned]
+        if unused:
+            more = "; compass.csv says how the craft turns" if turned else ""
+            message = f"not read: {', '.join(unused)}{more}"
+            yield finding("ignored_column", message, file=table.path.name, line=1)
+
+
+def ignored_files(folder: Path, read: Collection[str] = ()) -> Iterator[Finding]:
+    """Name the tables in a log's folder that no log has, beside those that are read."""
     for path in sorted(folder.iterdir()):
         table = path.suffix.lower() in (".csv", ".tsv", ".txt", ".dat")
+        if path.name in read:
+            continue
         if path.name in FILES or not table or path.name.startswith(".") or not path.is_file():
             continue
         meant = difflib.get_close_matches(path.name.lower(), list(FILES), 1, 0.8)
@@ -381,6 +408,9 @@ def ignored_files(folder: Path) -> Iterator[Finding]:
 
 def _units(files: dict[str, FileSeen], limits: Limits) -> Iterator[Finding]:
     for name, seen in files.items():
+        if seen.lines > 2 and seen.usual_turn_rad_s > FAST_TURN_RAD_S:
+            message = f"the craft would turn by {seen.usual_turn_rad_s:.3g} rad/s: degrees?"
+            yield finding("degrees", message, file=name)
         step = seen.usual_step_s
         several = "source" in seen.table.names  # of which lines of one time are none
         if seen.lines > 2 and seen.equal > 0.5 * (seen.lines - 1) and not several:
@@ -393,15 +423,12 @@ def _units(files: dict[str, FileSeen], limits: Limits) -> Iterator[Finding]:
             yield finding("times_equal", message, file=name, line=seen.first_equal)
             continue
         if name == "odometry.csv" and seen.lines > 2:
-            velocities = "turn_rad" not in seen.table.names
+            velocities = "forward_m" not in seen.table.names
             slow = velocities and step > max(SLOW_ODOMETRY_S, limits.gap_s)
             crawl = not velocities and seen.path_m < SLOW_M_S * seen.span_s and seen.path_m > 5
             if slow or (crawl and step > 5):
                 yield _thousandths(name, step, seen)
                 continue
-            if seen.usual_turn_rad_s > FAST_TURN_RAD_S:
-                message = f"the craft would turn by {seen.usual_turn_rad_s:.3g} rad/s: degrees?"
-                yield finding("degrees", message, file=name)
             if seen.usual_speed_m_s > FAST_M_S:
                 message = (
                     f"the craft would move at {seen.usual_speed_m_s:.3g} m/s: millimetres or "
@@ -431,12 +458,11 @@ def _clocks(files: dict[str, FileSeen]) -> Iterator[Finding]:
             by = -seen.back.length_s
             message = f"the clock goes back by {by:.4g} s, to {seen.back.end_s:.10g} s"
             yield finding("clock_jump", message, file=name, line=seen.back.line)
-    main = files.get("odometry.csv") or files.get("fixes.csv")
+    main = _main(files)
     if main is None or main.lines < 2:
         return
-    for name in ("ranges.csv", "leaders.csv"):
-        other = files.get(name)
-        if other is None or other.lines < 2:
+    for name, other in files.items():
+        if other is main or other.lines < 2:
             continue
         apart = max(other.first_s, main.first_s) - min(other.last_s, main.last_s)
         ratio = (other.span_s / main.span_s) if main.span_s > 0 else math.inf
@@ -455,9 +481,15 @@ def _clocks(files: dict[str, FileSeen]) -> Iterator[Finding]:
         yield finding(cause, message, file=file, line=2)
 
 
+def _main(files: dict[str, FileSeen]) -> FileSeen | None:
+    """Give the file that has the clock of the log."""
+    names = ("odometry.csv", "fixes.csv", "positions.csv")
+    return next((files[name] for name in names if name in files), None)
+
+
 def _gaps(files: dict[str, FileSeen], limits: Limits) -> Iterator[Finding]:
     odometry = files.get("odometry.csv")
-    main = odometry or files.get("fixes.csv")
+    main = _main(files)
     if main is None:
         return
     jumps = [step for step in main.long if _is_jump(step, files)]
@@ -500,20 +532,20 @@ def _is_jump(step: Step, files: dict[str, FileSeen]) -> bool:
 
 
 def _sources(files: dict[str, FileSeen]) -> Iterator[Finding]:
-    if "ranges.csv" not in files and "fixes.csv" not in files:
-        return
-    seen = files.get("ranges.csv") or files["fixes.csv"]
-    if seen.lines == 0:
-        yield finding("no_measurements", "has no line below the header", file=seen.name)
+    names = ("ranges.csv", "fixes.csv", "positions.csv")
+    measured = [files[name] for name in names if name in files]
+    if not any(seen.lines for seen in measured):
+        yield finding("no_measurements", "has no line below the header", file=measured[0].name)
     if "odometry.csv" in files and files["odometry.csv"].lines == 0:
         yield finding("no_odometry", "has no line below the header", file="odometry.csv")
-    for source, one in sorted(seen.sources.items()):
-        for value, repeated in one.codes():
-            message = (
-                f"source {source}: {value:g} m stands in {repeated.lines} of {one.lines} lines: a "
-                "code for 'no echo'? Leave such lines out"
-            )
-            yield finding("no_echo", message, file=seen.name, line=repeated.first_line)
+    for seen in measured:
+        for source, one in sorted(seen.sources.items()):
+            for value, repeated in one.codes():
+                message = (
+                    f"source {source}: {value:g} m stands in {repeated.lines} of {one.lines} "
+                    "lines: a code for 'no echo'? Leave such lines out"
+                )
+                yield finding("no_echo", message, file=seen.name, line=repeated.first_line)
 
 
 def _places(log: LogFolder, files: dict[str, FileSeen]) -> Iterator[Finding]:
@@ -543,3 +575,10 @@ def _origin(log: LogFolder) -> Iterator[Finding]:
             "as a local origin; results are in the log's coordinates"
         )
         yield finding("local_origin", message)
+    earth = log.frame.origin
+    if earth is not None and "origin.csv" not in log:
+        message = (
+            f"x and y count from latitude {earth[0]:.7f}, longitude {earth[1]:.7f} (deg), the "
+            "first place of the log; origin.csv would say another"
+        )
+        yield finding("earth_origin", message)

@@ -32,8 +32,10 @@ CAUSES: Mapping[str, tuple[str, Verdict]] = {
     "odometry_gap": ("odometry pauses while the craft moves", "doubtful"),
     "no_echo": ("a value that stands for 'no echo' is logged as a range", "doubtful"),
     "ignored_file": ("a file that no log has is not read", "sound"),
+    "ignored_column": ("a column that the file of a log has not is not read", "sound"),
     "ignored_settings": ("settings that such a log has no use for", "sound"),
     "local_origin": ("coordinates are far from (0, 0); an origin is subtracted", "sound"),
+    "earth_origin": ("latitudes and longitudes count from the first of them", "sound"),
     # what the belief shows
     "not_converged": ("the ranges do not say where the craft is", "not_trusted"),
     "ambiguous": ("the ranges leave several places", "not_trusted"),

@@ -7,14 +7,16 @@ degrees, milliseconds, millimetres.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 _TURN = 2 * math.pi + 1e-6
+
+Unit: TypeAlias = Literal["s", "m", "m/s", "rad", "rad/s", "deg", ""]
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,15 @@ class Column:
         kind = "an integer" if self.integer else "a number"
         return f"{kind} from {self.low:.6g} to {self.high:.6g}"
 
+    @property
+    def unit(self) -> Unit:
+        """The unit that its name ends with."""
+        units: tuple[tuple[str, Unit], ...] = (
+            ("_rad_s", "rad/s"), ("_m_s", "m/s"), ("_rad", "rad"), ("_deg", "deg"), ("_m", "m"),
+            ("_s", "s"),
+        )  # fmt: skip
+        return next((unit for end, unit in units if self.name.endswith(end)), "")
+
     def takes(self, values: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
         """Say of each value whether it can stand in this column; NaN cannot."""
         good = (values >= self.low) & (values <= self.high)
@@ -45,46 +56,170 @@ class Column:
         return np.asarray(good, bool)
 
 
-_COLUMNS = {
+@dataclass(frozen=True)
+class Layout:
+    """The columns that a file must have, and those that it may have beside them."""
+
+    required: tuple[Column, ...]
+    optional: tuple[Column, ...] = ()
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """All of them, in the order of rows."""
+        return self.required + self.optional
+
+    def __str__(self) -> str:
+        text = ",".join(column.name for column in self.required)
+        also = ",".join(column.name for column in self.optional)
+        return f"{text}[,{also}]" if also else text
+
+
+def _length(name: str, limit: float = 1e4, low: float | None = None) -> Column:
+    low = -limit if low is None else low
+    return Column(name, low, limit, "millimetres?", cause="millimetres")
+
+
+def _speed(name: str) -> Column:
+    return Column(name, -50, 50, "millimetres per second?", cause="millimetres")
+
+
+def _angle(name: str) -> Column:
+    return Column(name, -_TURN, _TURN, "degrees?", cause="degrees")
+
+
+#: Every column that a file can have, by its name.
+COLUMNS: Mapping[str, Column] = {
     column.name: column
     for column in (
         Column("time_s", -1e11, 1e11, "milliseconds or nanoseconds?", cause="milliseconds"),
+        Column("time", -1e11, 1e11),
         Column("source", 0, 1e9, integer=True),
-        Column("forward_m", -1e4, 1e4, "millimetres?", cause="millimetres"),
-        Column("left_m", -1e4, 1e4, "millimetres?", cause="millimetres"),
-        Column("turn_rad", -_TURN, _TURN, "degrees?", cause="degrees"),
-        Column("speed_m_s", -50, 50, "millimetres per second?", cause="millimetres"),
+        _length("forward_m"),
+        _length("distance_m"),
+        _length("left_m"),
+        _length("starboard_m"),
+        _angle("turn_rad"),
+        _speed("speed_m_s"),
+        _speed("forward_m_s"),
+        _speed("left_m_s"),
+        _speed("starboard_m_s"),
+        _speed("down_m_s"),
         Column("yaw_rate_rad_s", -20, 20, "degrees per second?", cause="degrees"),
         Column("range_m", 0, 1e5, "millimetres, or a code for 'no echo'?", cause="millimetres"),
-        Column("bearing_rad", -_TURN, _TURN, "degrees?", cause="degrees"),
-        Column("heading_rad", -_TURN, _TURN, "degrees?", cause="degrees"),
-        Column("x_m", -1e7, 1e7, "millimetres?", cause="millimetres"),
-        Column("y_m", -1e7, 1e7, "millimetres?", cause="millimetres"),
-        Column("sigma_m", 0, 1e4, "millimetres?", cause="millimetres"),
+        _angle("bearing_rad"),
+        _angle("azimuth_rad"),
+        Column("elevation_rad", -1.6, 1.6, "degrees?", cause="degrees"),
+        Column("depression_rad", -1.6, 1.6, "degrees?", cause="degrees"),
+        _angle("heading_rad"),
+        _angle("compass_rad"),
+        _length("x_m", 1e7),
+        _length("y_m", 1e7),
+        _length("depth_m", 12_000, -1000),
+        _length("sigma_m", low=0),
+        Column("latitude_deg", -90, 90),
+        Column("longitude_deg", -360, 360),
     )
 }
 
 
-def _layout(*names: str) -> tuple[Column, ...]:
-    return tuple(_COLUMNS[name] for name in names)
+def _layout(required: str, optional: str = "") -> Layout:
+    def columns(names: str) -> tuple[Column, ...]:
+        return tuple(COLUMNS[name] for name in names.split(",") if name)
+
+    return Layout(columns(required), columns(optional))
 
 
-#: The files of a log and the columns each may have; one of the layouts, in any order of columns.
-FILES: Mapping[str, tuple[tuple[Column, ...], ...]] = {
+#: The files of a log and the columns each may have, in any order: the first layout whose columns
+#: are all there counts.
+FILES: Mapping[str, tuple[Layout, ...]] = {
     "odometry.csv": (
-        _layout("time_s", "forward_m", "left_m", "turn_rad"),
-        _layout("time_s", "speed_m_s", "yaw_rate_rad_s"),
+        _layout("time_s,forward_m,left_m,turn_rad"),
+        _layout("time_s,forward_m,turn_rad"),
+        _layout("time_s,speed_m_s,yaw_rate_rad_s", "left_m_s"),
+        _layout("time_s,forward_m,heading_rad", "left_m"),
+        _layout("time_s,speed_m_s,heading_rad", "left_m_s"),
+        _layout("time_s,forward_m", "left_m"),
+        _layout("time_s,speed_m_s", "left_m_s"),
     ),
-    "ranges.csv": (_layout("time_s", "source", "range_m"),),
-    "fixes.csv": (_layout("time_s", "source", "range_m", "bearing_rad"),),
-    "beacons.csv": (_layout("source", "x_m", "y_m"),),
-    "leaders.csv": (
-        _layout("time_s", "source", "x_m", "y_m"),
-        _layout("time_s", "source", "x_m", "y_m", "sigma_m"),
-    ),
-    "start.csv": (_layout("time_s", "x_m", "y_m", "heading_rad"),),
-    "truth.csv": (
-        _layout("time_s", "x_m", "y_m"),
-        _layout("time_s", "x_m", "y_m", "heading_rad"),
-    ),
+    "compass.csv": (_layout("time_s,heading_rad"),),
+    "ranges.csv": (_layout("time_s,source,range_m"),),
+    "fixes.csv": (_layout("time_s,source,range_m,bearing_rad", "elevation_rad"),),
+    "positions.csv": (_layout("time_s,x_m,y_m", "sigma_m,depth_m"),),
+    "velocities.csv": (_layout("time_s,forward_m_s,left_m_s,heading_rad", "down_m_s"),),
+    "depth.csv": (_layout("time_s,depth_m"),),
+    "beacons.csv": (_layout("source,x_m,y_m", "depth_m"),),
+    "leaders.csv": (_layout("time_s,source,x_m,y_m", "sigma_m,depth_m"),),
+    "start.csv": (_layout("time_s,x_m,y_m,heading_rad"), _layout("time_s,x_m,y_m")),
+    "truth.csv": (_layout("time_s,x_m,y_m", "heading_rad"),),
+    "origin.csv": (_layout("latitude_deg,longitude_deg"),),
 }
+
+#: Other columns that can stand in the place of one, or of two: what they are is in their names.
+SPELLINGS: Mapping[tuple[str, ...], tuple[tuple[str, ...], ...]] = {
+    ("time_s",): (("time",),),
+    ("forward_m",): (("distance_m",),),
+    ("left_m",): (("starboard_m",),),
+    ("speed_m_s",): (("forward_m_s",),),
+    ("left_m_s",): (("starboard_m_s",),),
+    ("heading_rad",): (("compass_rad",),),
+    ("bearing_rad",): (("azimuth_rad",),),
+    ("elevation_rad",): (("depression_rad",),),
+    ("x_m", "y_m"): (("latitude_deg", "longitude_deg"),),
+}
+
+
+@dataclass(frozen=True)
+class Match:
+    """The layout that a header has.
+
+    Attributes
+    ----------
+    columns : tuple of Column
+        What rows hold, in their order.
+    given : tuple of str
+        The column of the file that each comes from: itself, or its other spelling.
+    """
+
+    columns: tuple[Column, ...]
+    given: tuple[str, ...]
+
+
+def match(name: str, header: Collection[str]) -> Match | None:
+    """Find the first layout of a file whose columns are all in a header; None if there is none."""
+    for layout in FILES[name]:
+        required = [_given(layout, column.name, header) for column in layout.required]
+        if None in required:
+            continue
+        optional = [(column, _given(layout, column.name, header)) for column in layout.optional]
+        there = [(column, given) for column, given in optional if given is not None]
+        return Match(
+            layout.required + tuple(column for column, _ in there),
+            (*(given for given in required if given), *(given for _, given in there)),
+        )
+    return None
+
+
+def _given(layout: Layout, column: str, header: Collection[str]) -> str | None:
+    """Say which column of a header gives one of the layout."""
+    if column in header:
+        return column
+    own = {other.name for other in layout.columns}
+    for names, spellings in SPELLINGS.items():
+        for other in spellings if column in names else ():
+            if all(one in header and one not in own for one in other):
+                return other[names.index(column)]
+    return None
+
+
+def near(name: str, columns: tuple[Column, ...]) -> set[str]:
+    """Give all columns of the layouts that have these among theirs: what else could be meant."""
+    wanted = {column.name for column in columns}
+    layouts = [{one.name for one in layout.columns} for layout in FILES[name]]
+    found = set().union(*(names for names in layouts if wanted <= names))
+    return found | {
+        other
+        for names, spellings in SPELLINGS.items()
+        if set(names) <= found
+        for one in spellings
+        for other in one
+    }

@@ -33,13 +33,15 @@ def shifted(log: LogFolder, origin: tuple[float, float] | None) -> LogFolder:
              first + 1: lambda rows: rows[:, first + 1] - origin[1]}
         )  # fmt: skip
 
-    places = {"beacons.csv": 1, "leaders.csv": 2, "start.csv": 1, "truth.csv": 1}
+    places = {"beacons.csv": 1, "leaders.csv": 2, "start.csv": 1, "truth.csv": 1,
+              "positions.csv": 1}  # fmt: skip
     return ChangedLog(log, {name: shift(first) for name, first in places.items()})
 
 
 def _somewhere(log: LogFolder) -> tuple[float, float]:
-    """Give a place of the log: the start, else the first beacon, else the first of a leader."""
-    for name, first in (("start.csv", 1), ("beacons.csv", 1), ("leaders.csv", 2)):
+    """Give a place of the log: the start, else the first beacon, leader or position."""
+    names = {"start.csv": 1, "beacons.csv": 1, "leaders.csv": 2, "positions.csv": 1}
+    for name, first in names.items():
         if name in log:
             for rows, _ in log[name].chunks():
                 return float(rows[0, first]), float(rows[0, first + 1])

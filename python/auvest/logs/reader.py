@@ -5,22 +5,32 @@ Files are read in chunks, so that memory does not grow with their length.
 
 from __future__ import annotations
 
+import csv
 import math
 from collections.abc import Iterator
 from contextlib import suppress
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from auvest._outputs import is_plain_file
-from auvest.logs.layout import FILES, Column
+from auvest.logs.layout import COLUMNS, FILES, Column, match, near
+from auvest.logs.reading import Axes, FileReading, Reading, seconds_of
 
 Rows = npt.NDArray[np.float64]
 
 #: Lines read at once: a few megabytes, and long enough that the cost of a chunk does not count.
 CHUNK_LINES = 32768
+#: What a name ends with that is in another unit than the layout's.
+_OTHER_UNITS = frozenset(
+    (
+        "deg", "degrees", "deg_s", "rad", "rad_s", "min", "h", "s", "ms", "us", "ns", "m", "mm",
+        "cm", "km", "ft", "m_s", "mm_s", "cm_s", "km_h", "kn", "knots",
+    )
+)  # fmt: skip
 #: More than any file has that is read as a whole: beacons.csv and start.csv.
 SMALL_FILE_LINES = 100_000
 
@@ -61,18 +71,64 @@ class LogError(ValueError):
         self.cause = cause
 
 
+class Frame:
+    """Which way the axes of a log point, and where they begin on Earth.
+
+    Parameters
+    ----------
+    axes : {"enu", "ned"}
+        x east, y north, or x north, y east.
+
+    Attributes
+    ----------
+    origin : tuple of float or None
+        Latitude and longitude (deg) of (0, 0), of a log with places on Earth.
+    """
+
+    def __init__(self, axes: Axes = "enu") -> None:
+        self.axes = axes
+        self.origin: tuple[float, float] | None = None
+
+    def sideways(self, left: Rows) -> Rows:
+        """Turn a number that counts to the left into one from forward as +y from +x; and back."""
+        return left if self.axes == "enu" else -left
+
+    def from_north(self, clockwise: Rows) -> Rows:
+        """Turn an angle clockwise from north into one from +x towards +y."""
+        return clockwise if self.axes == "ned" else 0.5 * math.pi - clockwise
+
+    def local(self, latitude_deg: Rows, longitude_deg: Rows) -> tuple[Rows, Rows]:
+        """Give x and y (m) in the tangent plane of the origin."""
+        from pymap3d import geodetic2enu  # here, because few logs need it
+
+        assert self.origin is not None
+        zero = np.zeros(len(latitude_deg))
+        east, north, _ = geodetic2enu(latitude_deg, longitude_deg, zero, *self.origin, 0.0)
+        return (east, north) if self.axes == "enu" else (north, east)
+
+
 class CsvTable:
     """One file of a log.
 
     Parameters
     ----------
     path : Path
-        The file; its name says which columns it must have (:data:`auvest.logs.FILES`).
+        The file.
+    name : str, optional
+        Which of :data:`auvest.logs.FILES` it is; default: that of its name.
+    reading : FileReading, optional
+        Names, units and separator, where they are not those of docs/logs.md.
+    frame : Frame, optional
+        Which way the axes point.
 
     Attributes
     ----------
     columns : tuple of Column
-        The layout that the file has; rows come with their values in this order.
+        The layout that the file has; rows come with their values in this order, in SI units and
+        angles from +x towards +y. What a log counts to the left, rows count from forward as +y
+        from +x, what it counts from north, they count from +x.
+    ignored : list of str
+        Columns of the file that are of no use.
     bytes : int
         Size of the file.
     bytes_read : int
@@ -84,8 +140,18 @@ class CsvTable:
         If the file cannot be read or its header is not one of the layouts.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(
+        self,
+        path: Path,
+        *,
+        name: str | None = None,
+        reading: FileReading | None = None,
+        frame: Frame | None = None,
+    ) -> None:
         self.path = path
+        self.name = path.name if name is None else name
+        self.frame = Frame() if frame is None else frame
+        self._reading = FileReading() if reading is None else reading
         try:
             if path.exists() and not is_plain_file(path):  # a pipe would be waited for
                 raise LogError(path, "is not a file")
@@ -98,10 +164,8 @@ class CsvTable:
             raise LogError(path, "is not UTF-8 text") from None
         self.bytes_read = 0
         self._refuse_separator(header)
-        names = [name.strip() for name in header.rstrip("\r\n").split(",")]
-        self.columns = self._match(names)
-        self._order = [names.index(column.name) for column in self.columns]
-        self._in_order = self._order == list(range(len(names)))
+        self._header = self._cells(header)
+        self._match(self._named(self._header))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -116,6 +180,10 @@ class CsvTable:
         LogError
             At the first line that is not what the layout says.
         """
+        for lines, line in self._lines():
+            yield self._converted(self._parse(lines, line)), line
+
+    def _lines(self) -> Iterator[tuple[list[str], int]]:
         line = 2
         blank: list[str] = []  # such lines at the end of the file are none, others are errors
         try:
@@ -125,7 +193,7 @@ class CsvTable:
                     self.bytes_read += sum(map(len, chunk))
                     lines, blank = _without_blank_end(blank + chunk)
                     if lines:
-                        yield self._parse(lines, line), line
+                        yield lines, line
                         line += len(lines)
         except OSError as error:
             raise LogError(self.path, f"cannot be read: {error.strerror or error}") from None
@@ -156,70 +224,175 @@ class CsvTable:
             occurrence -= len(found)
         return None
 
+    @property
+    def geographic(self) -> bool:
+        """Whether its places are given by latitude and longitude."""
+        return "latitude_deg" in self._given and self.name != "origin.csv"
+
+    def first_place(self) -> tuple[float, float] | None:
+        """Give latitude and longitude (deg) of the first line; None if there is none."""
+        at = self._given.index("latitude_deg")
+        for lines, line in self._lines():
+            latitude, longitude = self._parse(lines[:1], line)[0, at : at + 2].tolist()
+            return latitude, longitude
+        return None
+
+    def column(self, rows: Rows, name: str, default: float = math.nan) -> Rows:
+        """Give a column of rows; a default where the file has not got it."""
+        if name not in self.names:
+            return np.full(len(rows), default)
+        return rows[:, self.names.index(name)]
+
+    def _cells(self, line: str) -> list[str]:
+        """Part a line where the separator is not between quotes."""
+        text = line.rstrip("\r\n")
+        separator = self._reading.separator
+        if separator == " ":
+            return text.split()
+        if '"' in text:
+            return next(csv.reader([text], delimiter=separator), [])
+        return text.split(separator)
+
+    def _named(self, header: list[str]) -> dict[str, int]:
+        """Say in which cell each column of a log stands, under its name there."""
+        cells = [cell.strip() for cell in header]
+        named = {cell: k for k, cell in enumerate(cells)}
+        for column, said in self._reading.columns.items():
+            cell = said if said in named else said.removeprefix("-")
+            if cell not in named:
+                raise LogError(
+                    self.path,
+                    f"has no column {cell!r}, which {self._reading.where} names for {column}, but "
+                    f"{', '.join(cells)}",
+                    line=1,
+                )
+            named[column] = cells.index(cell)
+        return named
+
     def _refuse_separator(self, header: str) -> None:
         for mark, name in ((";", "semicolons"), ("\t", "tabs")):
-            if mark in header and "," not in header:
+            if mark in header and self._reading.separator not in header:
                 raise LogError(
                     self.path,
                     f"cells are parted by {name}; the separator is a comma, and the decimal mark a "
-                    "point",
+                    "point, unless [columns] of the settings say otherwise",
                     line=1,
                     cause="separator",
                 )
 
-    def _match(self, names: list[str]) -> tuple[Column, ...]:
-        layouts = FILES[self.path.name]
-        for layout in layouts:
-            if sorted(names) == sorted(column.name for column in layout):
-                return layout
-        known = {column.name for layout in layouts for column in layout}
+    def _match(self, cells: dict[str, int]) -> None:
+        names = [cell.strip() for cell in self._header]
+        found = match(self.name, cells)
+        known = near(self.name, () if found is None else found.columns)
+        given = set() if found is None else {*found.given, *(one.name for one in found.columns)}
+        stems = {one.split("_")[0] for one in given}
         for name in names:
-            stem = name.split("_")[0]
+            stem, _, unit = name.partition("_")
             meant = [other for other in sorted(known) if other.split("_")[0] == stem]
-            if name not in known and meant:
+            wrong = found is None or (stem not in stems and unit in _OTHER_UNITS)
+            if name not in known and meant and wrong and name not in self._mapped():
                 raise LogError(
                     self.path, f"its unit is not known here; expected {meant[0]}", line=1,
                     column=name,
                 )  # fmt: skip
-        expected = " or ".join(",".join(column.name for column in layout) for layout in layouts)
-        raise LogError(self.path, f"the header must be {expected}, not {','.join(names)}", line=1)
+        twice = found is not None and any(names.count(names[cells[one]]) > 1 for one in found.given)
+        if found is None or twice:
+            expected = " or ".join(str(layout) for layout in FILES[self.name])
+            said = f"; {self._reading.where} names columns" if self._reading.columns else ""
+            raise LogError(
+                self.path, f"the header must be {expected}, not {','.join(names)}{said}", line=1
+            )
+        self.columns = found.columns
+        self._given = found.given
+        self._used = [cells[one] for one in found.given]
+        self._factors = [self._reading.factor(one) for one in found.given]
+        self.ignored = [name for k, name in enumerate(names) if k not in self._used]
+        self._plain = self._used == list(range(len(names)))
+        self._limits = [COLUMNS[one] for one in self._given]
+
+    def _mapped(self) -> set[str]:
+        return {said.removeprefix("-") for said in self._reading.columns.values()}
 
     def _parse(self, lines: list[str], first: int) -> Rows:
         if not lines[-1].endswith("\n"):
             raise LogError(
                 self.path, "does not end with a line end: truncated", line=first + len(lines) - 1
             )
-        rows: Rows = np.empty((0, 0))
-        with suppress(ValueError):
-            rows = np.loadtxt(lines, delimiter=",", comments=None, ndmin=2)
-        if rows.shape != (len(lines), len(self.columns)):
+        rows = self._loaded(lines)
+        if rows is None:
             rows = np.array([self._parse_line(text, first + i) for i, text in enumerate(lines)])
-        if not self._in_order:
-            rows = rows[:, self._order]
+        for k, factor in enumerate(self._factors):
+            if factor != 1.0:
+                rows[:, k] *= factor
         self._check(rows, first)
         return rows
 
+    def _loaded(self, lines: list[str]) -> Rows | None:
+        """Read lines at once; None if one of them is not what it should be."""
+        separator, iso = self._reading.separator, "time" in self._given
+        if separator != " " and (not self._plain or iso):
+            count = len(self._header) - 1
+            if any(line.count(separator) != count for line in lines):
+                return None
+        if self._reading.decimal == ",":
+            lines = [line.replace(",", ".") for line in lines]
+        options: dict[str, Any] = {} if self._plain else {"usecols": self._used}
+        if iso:
+            options["converters"] = {self._used[self._given.index("time")]: seconds_of}
+        with suppress(ValueError):
+            delimiter = None if separator == " " else separator
+            rows = np.loadtxt(lines, delimiter=delimiter, comments=None, ndmin=2, **options)
+            if rows.shape == (len(lines), len(self._used)):
+                return rows
+        return None
+
     def _parse_line(self, text: str, line: int) -> list[float]:
-        cells = text.rstrip("\r\n").split(",")
-        if len(cells) != len(self.columns):
-            comma = len(cells) > len(self.columns) and all(map(_digits, cells))
+        cells = self._cells(text)
+        expected = len(self._header)
+        if len(cells) != expected:
+            comma = len(cells) > expected and all(map(_digits, cells))
             why = "decimal commas?" if comma else "truncated?"
             raise LogError(
-                self.path, f"{len(cells)} cells, expected {len(self.columns)}: {why}",
+                self.path, f"{len(cells)} cells, expected {expected}: {why}",
                 line=line, cause="decimal_comma" if comma else "unreadable",
             )  # fmt: skip
         values = []
-        for k, cell in enumerate(cells):
+        for k, given in zip(self._used, self._given, strict=True):
+            cell = cells[k]
             try:
+                if given == "time":
+                    values.append(seconds_of(cell))
+                    continue
+                if self._reading.decimal == ",":
+                    cell = cell.replace(",", ".")
                 values.append(float(cell.replace("_", "?")))  # 1_000 is Python's, not a number
-            except ValueError:
-                name = self.columns[self._order.index(k)].name
+            except ValueError as error:
                 what = f"{cell.strip()!r} is not a number" if cell.strip() else "is empty"
+                if given == "time" and cell.strip():
+                    what = str(error)
+                name = self._header[k].strip()
                 raise LogError(self.path, what, line=line, column=name) from None
         return values
 
+    def _converted(self, rows: Rows) -> Rows:
+        """Give rows with the numbers that the layout's names stand for, on the log's axes."""
+        given, frame = self._given, self.frame
+        for k, name in enumerate(given):
+            if name in ("left_m", "left_m_s"):
+                rows[:, k] = frame.sideways(rows[:, k])
+            elif name in ("starboard_m", "starboard_m_s"):
+                rows[:, k] = -frame.sideways(rows[:, k])
+            elif name in ("compass_rad", "azimuth_rad"):
+                rows[:, k] = frame.from_north(rows[:, k])
+            elif name == "depression_rad":
+                rows[:, k] = -rows[:, k]
+        if self.geographic:
+            k = given.index("latitude_deg")
+            rows[:, k], rows[:, k + 1] = frame.local(rows[:, k].copy(), rows[:, k + 1].copy())
+        return rows
+
     def _check(self, rows: Rows, first: int) -> None:
-        for k, column in enumerate(self.columns):
+        for k, column in enumerate(self._limits):
             values = rows[:, k]
             good = column.takes(values)
             if good.all():
@@ -228,11 +401,14 @@ class CsvTable:
             value = float(values[i])
             hint = f" ({column.suspicion})" if column.suspicion and math.isfinite(value) else ""
             missing = "; leave out the row where there is no measurement" if value != value else ""
+            if self._given[k] in self._reading.units:
+                unit = self._reading.units[self._given[k]]
+                missing += f"; {self._reading.where} takes the file's numbers in {unit!r}"
             raise LogError(
                 self.path,
                 f"{value:.10g} is not {column.expected}{hint}{missing}",
                 line=first + i,
-                column=column.name,
+                column=self._header[self._used[k]].strip(),
                 cause=_cause(column, value),
             )
 
@@ -269,32 +445,88 @@ class LogFolder:
         The folder.
     truth : bool
         False: truth.csv is left out where the run does not start from it.
+    reading : Reading, optional
+        Which way the axes point, and how files are read that are not as docs/logs.md says.
+
+    Attributes
+    ----------
+    frame : Frame
+        The axes, and where they begin on Earth.
 
     Raises
     ------
     LogError
-        If it is not a folder with measurements: odometry.csv with ranges.csv, or fixes.csv, and
-        beside them beacons.csv, leaders.csv or both.
+        If it is not a folder with measurements: odometry.csv with ranges.csv, fixes.csv or
+        positions.csv, or one of the last two alone; beside ranges and fixes beacons.csv,
+        leaders.csv or both.
     """
 
-    def __init__(self, path: Path, *, truth: bool = True) -> None:
+    def __init__(self, path: Path, *, truth: bool = True, reading: Reading | None = None) -> None:
         self.path = path
         if not path.is_dir():
             raise LogError(path, "is not a folder; a log is a folder of CSV files (docs/logs.md)")
-        names = [name for name in FILES if (path / name).exists()]
-        if not truth and ("start.csv" in names or "fixes.csv" in names):
+        reading = Reading() if reading is None else reading
+        paths = {name: path / (reading.of(name).file or name) for name in FILES}
+        for name, one in paths.items():
+            if reading.of(name).file and not one.exists():
+                raise LogError(one, f"is not there, and {reading.of(name).where} names it")
+        names = [name for name, one in paths.items() if one.exists()]
+        if not truth and ("start.csv" in names or "odometry.csv" not in names):
             names = [name for name in names if name != "truth.csv"]
-        self.tables = {name: CsvTable(path / name) for name in names}
-        if "fixes.csv" not in self and "ranges.csv" not in self:
-            raise LogError(path, "has neither ranges.csv nor fixes.csv")
-        if "fixes.csv" in self and "ranges.csv" in self:
-            raise LogError(path, "has ranges.csv and fixes.csv; one log is for one filter")
-        if "ranges.csv" in self and "odometry.csv" not in self:
-            raise LogError(path, "has ranges.csv but no odometry.csv", cause="no_odometry")
-        if "fixes.csv" in self and "odometry.csv" in self:
-            raise LogError(path, "has fixes.csv and odometry.csv; a tracked craft tells nothing")
-        if "beacons.csv" not in self and "leaders.csv" not in self:
+        self.frame = Frame(reading.frame)
+        self.tables = {
+            name: CsvTable(paths[name], name=name, reading=reading.of(name), frame=self.frame)
+            for name in names
+        }
+        self._require_what_a_log_needs()
+        self._find_origin()
+
+    def _require_what_a_log_needs(self) -> None:
+        path = self.path
+        measured = [name for name in ("ranges.csv", "fixes.csv", "positions.csv") if name in self]
+        if not measured:
+            raise LogError(path, "has neither ranges.csv nor fixes.csv nor positions.csv")
+        if "odometry.csv" not in self:
+            if "ranges.csv" in self:
+                raise LogError(path, "has ranges.csv but no odometry.csv", cause="no_odometry")
+            if "compass.csv" in self:
+                raise LogError(path, "has compass.csv but no odometry.csv", cause="no_odometry")
+        elif "velocities.csv" in self:
+            raise LogError(
+                path, "has odometry.csv and velocities.csv; the second is for a craft that is "
+                "tracked, without the first",
+            )  # fmt: skip
+        placed = "beacons.csv" in self or "leaders.csv" in self
+        if measured != ["positions.csv"] and not placed:
             raise LogError(path, "has neither beacons.csv nor leaders.csv: where are the sources?")
+        if "odometry.csv" in self and "compass.csv" not in self:
+            table = self["odometry.csv"]
+            if not {"turn_rad", "yaw_rate_rad_s", "heading_rad"} & set(table.names):
+                raise LogError(
+                    table.path, "has no turn_rad, yaw_rate_rad_s or heading_rad, and there is no "
+                    "compass.csv: how does the craft turn?", line=1,
+                )  # fmt: skip
+
+    def _find_origin(self) -> None:
+        """Find where on Earth (0, 0) is, if a file has places there."""
+        names = ("start.csv", "beacons.csv", "leaders.csv", "positions.csv", "truth.csv")
+        geographic = [name for name in names if name in self and self[name].geographic]
+        local = [name for name in names if name in self and not self[name].geographic]
+        if "origin.csv" in self:
+            table = self["origin.csv"]
+            rows = table.whole()
+            if len(rows) != 1:
+                raise LogError(table.path, f"has {len(rows)} lines below the header, expected 1")
+            self.frame.origin = (float(rows[0, 0]), float(rows[0, 1]))
+        elif geographic and local:
+            raise LogError(
+                self.path,
+                f"{geographic[0]} has latitudes and {local[0]} metres: where on Earth is (0, 0)? "
+                "Say so in origin.csv",
+            )
+        for name in geographic:
+            if self.frame.origin is None:
+                self.frame.origin = self[name].first_place()
 
     def __contains__(self, name: object) -> bool:
         return name in self.tables
@@ -304,19 +536,25 @@ class LogFolder:
 
     @property
     def tracking(self) -> bool:
-        """True if fixes of a craft are recorded, False if its own odometry and ranges are."""
-        return "fixes.csv" in self
+        """True if a craft is tracked that tells no odometry, False if it tells its own."""
+        return "odometry.csv" not in self
 
     def beacons(self) -> dict[int, tuple[float, float]]:
         """Give the positions (m) of the sources that do not move."""
+        return {source: place[:2] for source, place in self.stations().items()}
+
+    def stations(self) -> dict[int, tuple[float, float, float]]:
+        """Give positions and depths (m) of the sources that do not move; at 0 m where unsaid."""
         if "beacons.csv" not in self:
             return {}
         table = self["beacons.csv"]
-        places: dict[int, tuple[float, float]] = {}
-        for k, (source, x, y) in enumerate(table.whole().tolist()):
+        places: dict[int, tuple[float, float, float]] = {}
+        rows = table.whole()
+        depths = table.column(rows, "depth_m", 0.0).tolist()
+        for k, ((source, x, y), depth) in enumerate(zip(rows[:, :3].tolist(), depths, strict=True)):
             if int(source) in places:
                 raise LogError(
                     table.path, f"source {int(source)} is there twice", line=k + 2, column="source"
                 )
-            places[int(source)] = (x, y)
+            places[int(source)] = (x, y, depth)
         return places

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from auvest._outputs import new_file
-from auvest.logs.layout import FILES
+from auvest.logs.layout import COLUMNS, FILES, match
 
 
 def write_file(folder: Path, name: str, **columns: npt.ArrayLike) -> None:
@@ -21,7 +21,9 @@ def write_file(folder: Path, name: str, **columns: npt.ArrayLike) -> None:
     name : str
         Which file of the layout, for example ``"ranges.csv"``.
     **columns : array_like, shape (T,)
-        The columns by name, as one of the layouts has them.
+        The columns by name, as one of the layouts has them, or in another spelling:
+        ``latitude_deg`` and ``longitude_deg`` for ``x_m`` and ``y_m``, ``compass_rad`` for
+        ``heading_rad``, ... Times are in seconds.
 
     Raises
     ------
@@ -29,13 +31,11 @@ def write_file(folder: Path, name: str, **columns: npt.ArrayLike) -> None:
         If the columns are not those of a layout, or hold what the reader would refuse; then nothing
         is written.
     """
-    layout = next(
-        (one for one in FILES[name] if {column.name for column in one} == set(columns)), None
-    )
-    if layout is None:
-        known = [tuple(column.name for column in one) for one in FILES[name]]
+    found = match(name, columns)
+    if found is None or set(found.given) != set(columns):
+        known = ", ".join(f"({layout})" for layout in FILES[name])
         raise ValueError(f"{name} must have the columns {known}, not {list(columns)}")
-    for column in layout:
+    for column in (COLUMNS[one] for one in found.given):
         given = np.asarray(columns[column.name])
         good = column.takes(given)
         if not good.all():
@@ -44,7 +44,7 @@ def write_file(folder: Path, name: str, **columns: npt.ArrayLike) -> None:
                 f"{name}, row {k}, column {column.name}: {given[k]} is not {column.expected}"
             )
     folder.mkdir(parents=True, exist_ok=True)
-    values = [np.asarray(columns[column.name]).tolist() for column in layout]
+    values = [np.asarray(columns[one]).tolist() for one in found.given]
     with new_file(folder / name, "w", encoding="utf-8", newline="\n") as file:
-        file.write(",".join(column.name for column in layout) + "\n")
+        file.write(",".join(found.given) + "\n")
         file.writelines(",".join(map(repr, row)) + "\n" for row in zip(*values, strict=True))

@@ -22,7 +22,8 @@ from auvest.logs.findings import Finding, finding
 from auvest.logs.reader import CsvTable, Rows
 from auvest.replay.config import FilterName, Settings
 from auvest.replay.engine import replay_of
-from auvest.replay.health import FEW, Residuals, numbers_measured
+from auvest.replay.health import FEW, Residuals, numbers_of
+from auvest.replay.instruments import Instruments
 from auvest.replay.sources import Sources
 from auvest.replay.tables import Columns
 
@@ -144,15 +145,17 @@ def log_likelihoods(rows: Columns) -> Floats:
     A measurement is an outlier with a small probability, and then anywhere within a wide reach;
     this makes gross errors cost the same under every hypothesis.
     """
-    numbers = numbers_measured(rows)
+    numbers = numbers_of(rows)
     sigma = rows["sigma_0"]
     inlier = -0.5 * rows["nis"] - np.log(sigma) - 0.5 * numbers * math.log(2 * math.pi)
     reach = math.log(OUTLIER_REACH_M) * np.ones(len(sigma))
-    if numbers == 2:
-        near = rows["near_field"] != 0  # there both numbers are metres
-        inlier -= np.log(rows["sigma_1"])
-        inlier[near] += np.log(np.maximum(rows["range_m"][near], 1e-3))
-        reach += math.log(2 * math.pi)
+    fix = rows["sensor"] == "fix"
+    near = fix & (rows["near_field"] != 0)  # there all numbers are metres
+    for k in (1, 2):
+        more = numbers > k
+        inlier[more] -= np.log(rows[f"sigma_{k}"][more])
+        inlier[more & near] += np.log(np.maximum(rows["range_m"][more & near], 1e-3))
+        reach[more] += np.where(fix[more], math.log(2 * math.pi), math.log(OUTLIER_REACH_M))
     return _with_outliers(inlier, reach)
 
 
@@ -227,21 +230,26 @@ class _Refits:
         Each number that it measures has an offset and a spread of its own: the median and the
         median absolute deviation of its differences from the track; those of range are returned.
         """
-        table = self._log["fixes.csv" if self._log.tracking else "ranges.csv"]
-        measured = _rows(table)
-        measured = measured[measured[:, 1] == source]
-        places = _sources(self._log, self._settings).locate(measured[:, 0], measured[:, 1])
-        inside = ~np.isnan(places[:, 0])
-        inside &= (measured[:, 0] >= run.track[0, 0]) & (measured[:, 0] <= run.track[-1, 0])
-        measured, places = measured[inside], places[inside]
+        name = "ranges.csv" if "ranges.csv" in self._log else "fixes.csv"
+        sources = _sources(self._log, self._settings)
+        instruments = Instruments(self._log, self._settings, sources, spatial=False)
+        if "depth.csv" in self._log:
+            instruments.depths.add(_rows(self._log["depth.csv"]))
+        lines = _rows(self._log[name])
+        measured = instruments.read(name, lines[lines[:, 1] == source])
+        inside = measured.located
+        inside &= measured.taken_s >= run.track[0, 0]
+        inside &= measured.taken_s <= run.track[-1, 0]
+        measured = measured[inside]
         if len(measured) == 0:
             return np.empty(0), math.nan, math.nan
-        at = [np.interp(measured[:, 0], run.track[:, 0], run.track[:, k]) for k in (1, 2)]
-        away = (at[0] - places[:, 0]) + 1j * (at[1] - places[:, 1])
-        numbers = [measured[:, 2] - np.abs(away)]
+        at = [np.interp(measured.taken_s, run.track[:, 0], run.track[:, k]) for k in (1, 2)]
+        away = (at[0] - measured.place[:, 0]) + 1j * (at[1] - measured.place[:, 1])
+        numbers = [measured.z[:, 0] - np.abs(away)]
         least = [self._settings.ranges.sigma_m]
-        if self._log.tracking:
-            numbers.append(np.angle(np.exp(1j * measured[:, 3]) / np.exp(1j * np.angle(away))))
+        if name == "fixes.csv":
+            bearing = measured.z[:, 1]
+            numbers.append(np.angle(np.exp(1j * bearing) / np.exp(1j * np.angle(away))))
             fixes = self._settings.fixes
             least = [fixes.sigma_range_m, fixes.sigma_bearing_rad]
         inlier = np.zeros(len(measured))
@@ -270,50 +278,61 @@ def _likelihood(fit: Fit) -> float:
 def _families(log: LogFolder, rows: Columns, *, gross: bool) -> Iterator[list[Hypothesis] | Number]:
     """Give the hypotheses, those of one cause together."""
     tracking = log.tracking
-    measured = "fixes.csv" if tracking else "ranges.csv"
+    names = ("ranges.csv", "fixes.csv")
+
+    def measured(change: Change) -> dict[str, Change]:
+        return dict.fromkeys(names, change)
+
     if gross:
         yield list(_axes(log))
-        yield list(_headings(tracking, mirrored=True))
-        yield list(_headings(tracking, mirrored=False))
-        yield list(_degrees(tracking))
+        yield list(_headings(log, mirrored=True))
+        yield list(_headings(log, mirrored=False))
+        yield list(_degrees(log))
         yield list(_noises())
+    if not any(name in log for name in names):  # absolute positions alone
+        return
     yield Number(
         lambda scale: Hypothesis(
             "range_scale",
-            {measured: _of_range(lambda r: r * scale)},
+            measured(_of_range(lambda r: r * scale)),
             f"ranges times {scale:.3f} fit: a scale (speed of sound, antenna delay)",
         ),
         SCALES,
     )
-    yield Number(
-        lambda depth: Hypothesis(
-            "slant_range",
-            {measured: _of_range(lambda r: _level(r, depth))},
-            f"ranges fit with a depth difference of about {depth:.2g} m to the sources",
-        ),
-        DEPTHS_M,
-    )
+    if "depth.csv" not in log and not _has_elevations(log):
+        yield Number(
+            lambda depth: Hypothesis(
+                "slant_range",
+                measured(_of_range(lambda r: _level(r, depth))),
+                f"ranges fit with a depth difference of about {depth:.2g} m to the sources",
+            ),
+            DEPTHS_M,
+        )
     if not tracking:
         yield Number(
             lambda latency: Hypothesis(
                 "latency",
-                {measured: _earlier(latency)},
+                measured(_earlier(latency)),
                 f"ranges fit when taken {latency:.2g} s before their time",
             ),
             LATENCIES_S,
         )
-    sources = np.unique(rows["source"]).astype(int).tolist()
+    sources = np.unique(rows["source"][rows["source"] >= 0]).astype(int).tolist()
     if gross and len(sources) > 1:
         yield [
             Hypothesis(
                 "source_off",
-                {measured: _without(source)},
+                measured(_without(source)),
                 f"source {source}: its ranges are {{off:+.3g}} m off the track that the others "
                 "give, with a spread of {spread:.2g} m",
                 source=source,
             )
             for source in sources
         ]
+
+
+def _has_elevations(log: LogFolder) -> bool:
+    return "fixes.csv" in log and "elevation_rad" in log["fixes.csv"].names
 
 
 def _of_range(compute: Callable[[Rows], Rows]) -> Change:
@@ -340,8 +359,9 @@ def _axes(log: LogFolder) -> Iterator[Hypothesis]:
         yield Hypothesis("axes_exchanged", changes, message)
 
 
-def _headings(tracking: bool, *, mirrored: bool) -> Iterator[Hypothesis]:
+def _headings(log: LogFolder, *, mirrored: bool) -> Iterator[Hypothesis]:
     """Headings, or bearings, that turn the wrong way or count from another axis."""
+    tracking = log.tracking
     cause = "heading_mirrored" if mirrored else "heading_turned"
     what = "bearing" if tracking else "heading"
     angles = (0.0, _FOURTH, 2 * _FOURTH, -_FOURTH)[0 if mirrored else 1 :]
@@ -356,31 +376,29 @@ def _headings(tracking: bool, *, mirrored: bool) -> Iterator[Hypothesis]:
             continue
         changes: dict[str, Change] = {"start.csv": turned}
         if mirrored:
-            changes["odometry.csv"] = _turning(lambda turn: -turn)
+            changes |= _turning(log, lambda turn: -turn)
         yield Hypothesis(cause, changes, message)
     if mirrored and not tracking:
         message = "it fits with turns of the other sign"
-        yield Hypothesis(cause, {"odometry.csv": _turning(lambda turn: -turn)}, message)
+        yield Hypothesis(cause, _turning(log, lambda turn: -turn), message)
 
 
-def _degrees(tracking: bool) -> Iterator[Hypothesis]:
-    if tracking:
+def _degrees(log: LogFolder) -> Iterator[Hypothesis]:
+    if log.tracking:
         change = columns_changed({3: lambda rows: np.radians(rows[:, 3])})
         yield Hypothesis("degrees", {"fixes.csv": change}, "it fits with bearings in degrees")
         return
     message = "it fits with turns in degrees"
-    yield Hypothesis("degrees", {"odometry.csv": _turning(np.radians)}, message)
+    yield Hypothesis("degrees", _turning(log, np.radians), message)
 
 
-def _turning(compute: Callable[[Rows], Rows]) -> Change:
-    """Change the turns of an odometry file, which are its last column in both layouts."""
-
-    def change(rows: Rows) -> Rows:
-        made = rows.copy()
-        made[:, -1] = compute(rows[:, -1])
-        return made
-
-    return change
+def _turning(log: LogFolder, compute: Callable[[Rows], Rows]) -> dict[str, Change]:
+    """Change how the craft turns: by its compass, or by what the odometry has."""
+    file = "compass.csv" if "compass.csv" in log else "odometry.csv"
+    names = log[file].names
+    turns = ("turn_rad", "yaw_rate_rad_s", "heading_rad")
+    at = next(k for k, name in enumerate(names) if name in turns)
+    return {file: columns_changed({at: lambda rows: compute(rows[:, at])})}
 
 
 def _noises() -> Iterator[Hypothesis]:
@@ -398,8 +416,10 @@ def _noises() -> Iterator[Hypothesis]:
                     sigma_distance=times * s.odometry.sigma_distance,
                     sigma_drift=times * s.odometry.sigma_drift,
                     sigma_turn=times * s.odometry.sigma_turn,
+                    sigma_turned=times * s.odometry.sigma_turned,
                 ),
                 ranges=replace(s.ranges, sigma_m=times * s.ranges.sigma_m),
+                positions=replace(s.positions, sigma_m=times * s.positions.sigma_m),
                 fixes=replace(
                     s.fixes,
                     sigma_range_m=times * s.fixes.sigma_range_m,
@@ -407,7 +427,11 @@ def _noises() -> Iterator[Hypothesis]:
                 ),
                 process=replace(
                     s.process,
-                    **{name: times**2 * value for name, value in vars(s.process).items()},
+                    **{
+                        name: times**2 * value
+                        for name, value in vars(s.process).items()
+                        if name.endswith("_psd")
+                    },
                 ),
             )
 

@@ -10,10 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from auvest import plots
+from auvest._arguments import Floats
 from auvest.metrics import chi2_bounds
 from auvest.registry import filter_named
 from auvest.replay import tables
-from auvest.replay.health import numbers_measured
+from auvest.replay.health import numbers_of
 from auvest.replay.run import Result
 from auvest.replay.tables import Columns
 
@@ -21,27 +22,41 @@ from auvest.replay.tables import Columns
 _POSITIONS = ("x_m", "y_m", "place_x_m", "place_y_m")
 _ESTIMATES = ("x_m", "y_m", "var_x_m2", "cov_xy_m2", "var_y_m2")
 _ERRORS = ("error_x_m", "error_y_m", "sigma_x_m", "sigma_y_m")
-_MEASURED = (("range", "m"), ("bearing", "rad"))
+#: The numbers that each sensor measures, and their units.
+_MEASURED = {
+    "range": (("range", "m"),),
+    "fix": (("range", "m"), ("bearing", "rad"), ("elevation", "rad")),
+    "position": (("x", "m"), ("y", "m"), ("depth", "m")),
+    "velocity": (("speed", "m/s"), ("sideways speed", "m/s")),
+    "depth": (("depth", "m"),),
+}
 
 
 def document(results: Sequence[Result]) -> dict[str, Any]:
     """Give all that the page draws of replays of one log."""
     first = results[0]
-    numbers = numbers_measured(first.measurements.columns())
+    limit = _common_limit(results)
     times = [one.numbers[name] for one in results for name in ("first_s", "last_s")]
     known = [time for time in times if np.isfinite(time)] or [0.0]
     return {
         "from_s": min(known),
         "to_s": max(known),
         "outcomes": list(tables.OUTCOMES),
-        "measured": [{"what": what, "unit": unit} for what, unit in _MEASURED[:numbers]],
-        "nis_95": chi2_bounds(numbers, level=0.9)[1],  # one-sided
+        "sensors": [
+            {
+                "name": name,
+                "measured": [{"what": what, "unit": unit} for what, unit in _MEASURED[name]],
+                "sources": name not in ("velocity", "depth"),
+            }
+            for name in tables.SENSORS
+        ],
+        "nis_95": limit,
         "untrusted": [list(seconds) for seconds in first.health.untrusted_s],
         "looks": {
             "beacon": {"colour": plots.BLACK},
             "leader": {"colour": plots.GREY, "dashes": [1, 3]},
         },
-        "tracks": [track for one in results for track in _tracks(one)],
+        "tracks": [track for one in results for track in _tracks(one, shares=limit is None)],
         "lines": _lines(first),
         "beacons": [
             {"source": number, "x_m": float(x), "y_m": float(y)}
@@ -51,7 +66,7 @@ def document(results: Sequence[Result]) -> dict[str, Any]:
     }
 
 
-def _tracks(result: Result) -> list[dict[str, Any]]:
+def _tracks(result: Result, *, shares: bool) -> list[dict[str, Any]]:
     """Give the filter's track, and behind it the smoothed one if there is one."""
     name = result.filter_name
     estimates, errors = result.estimates.columns(), result.errors.columns()
@@ -64,8 +79,8 @@ def _tracks(result: Result) -> list[dict[str, Any]]:
             "dashes": list(plots.FILTER_DASHES[name]),
             "estimates": _part(estimates, _ESTIMATES),
             "errors": _part(errors, _ERRORS) if len(errors["time_s"]) else None,
-            "measurements": _measurements(result.measurements.columns()),
-            "doubted": _measurements(result.outliers.columns()),
+            "measurements": _measurements(result.measurements.columns(), shares=shares),
+            "doubted": _measurements(result.outliers.columns(), shares=shares),
         }
     ]
     if "smoothed_x_m" in estimates:
@@ -123,26 +138,55 @@ def _leaders(result: Result) -> list[dict[str, Any]]:
     return made
 
 
-def _measurements(rows: Columns) -> dict[str, Any]:
+def _limits(rows: Columns) -> Floats:
+    """Give what 95 % of the NIS of a consistent filter lie below, of each measurement."""
+    numbers = numbers_of(rows)
+    limits = np.zeros(len(numbers))
+    for number in np.unique(numbers).tolist():
+        limits[numbers == number] = chi2_bounds(number, level=0.9)[1]  # one-sided
+    return limits
+
+
+def _common_limit(results: Sequence[Result]) -> float | None:
+    """Give that limit if all measurements have the same."""
+    seen = set()
+    for one in results:
+        rows = one.measurements.columns()
+        seen |= set(_limits(rows)[~np.isnan(rows["nis"])].tolist())
+    return seen.pop() if len(seen) == 1 else None
+
+
+def _measurements(rows: Columns, *, shares: bool) -> dict[str, Any]:
+    """Give measurements in their order; ``shares``: the NIS that is drawn is that over its limit.
+
+    Sensors and outcomes are numbers there.
+    """
     order = np.argsort(rows["time_s"], kind="stable")
     sorted_ = {name: values[order] for name, values in rows.items()}
-    outcome = sorted_["outcome"]
-    numbers = np.zeros(len(outcome), np.uint8)
-    for number, name in enumerate(tables.OUTCOMES):
-        numbers[outcome == name] = number
     names = (
         "time_s", "x_m", "y_m", "place_x_m", "place_y_m", "range_m", "interval_s", "nis",
-        "innovation_0", "innovation_1", "sigma_0", "sigma_1", "held_out_error_m",
+        "innovation_0", "innovation_1", "innovation_2", "sigma_0", "sigma_1", "sigma_2",
+        "held_out_error_m",
     )  # fmt: skip
+    weights = np.fmin(np.fmin(sorted_["weight_0"], sorted_["weight_1"]), sorted_["weight_2"])
     return _encoded(
         {
             **{name: sorted_[name] for name in names},
-            "weight": np.fmin(sorted_["weight_0"], sorted_["weight_1"]),
+            "weight": weights,
+            "nis_drawn": sorted_["nis"] / _limits(sorted_) if shares else sorted_["nis"],
             "source": sorted_["source"].astype(np.int32),
-            "outcome": numbers,
+            "sensor": _numbered(sorted_["sensor"], tables.SENSORS),
+            "outcome": _numbered(sorted_["outcome"], tables.OUTCOMES),
             "near_field": (sorted_["near_field"] != 0).astype(np.uint8),
         }
     )
+
+
+def _numbered(values: npt.NDArray[Any], names: Sequence[str]) -> npt.NDArray[np.uint8]:
+    numbers = np.zeros(len(values), np.uint8)
+    for number, name in enumerate(names):
+        numbers[values == name] = number
+    return numbers
 
 
 def _part(rows: Columns, names: Sequence[str], prefix: str = "") -> dict[str, Any]:

@@ -4,6 +4,10 @@
 station that tracks a craft by range and bearing. Both turn the lines into rows for the C++ loop
 (``run`` of the filters); no filter looks at the truth, and no result depends on how the log was
 cut into chunks.
+
+A measurement with a latency comes in at the time of its line and goes in at that when it was taken
+(``late_s`` of the filters), at which a step ends. So that it is known, the replay stays behind what
+is read by the longest latency.
 """
 
 from __future__ import annotations
@@ -12,6 +16,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -23,17 +28,28 @@ from auvest._arguments import Floats
 from auvest.filters import Aukf, GaussianFilter, RobustEkf, RobustUkf, RunResult, Ukf
 from auvest.intervals import CovarianceBudget, FixedInterval, IntervalPolicy, MahalanobisInterval
 from auvest.logs import LogError, LogFolder, Stream, merge
+from auvest.logs.changed import ChangedLog, columns_changed
 from auvest.logs.reader import Rows
-from auvest.models import ConstantAcceleration, LeaderRange, Odometry, RangeBearing
+from auvest.models import (
+    ConstantAcceleration,
+    MeasurementModel,
+    Odometry,
+    ProcessModel,
+    RangeBearing,
+    WhiteAcceleration,
+)
 from auvest.replay import tables
 from auvest.replay.config import FilterName, IntervalSettings, Settings
-from auvest.replay.motion import Motion, carry, dead_reckon
+from auvest.replay.instruments import Instruments, Measured
+from auvest.replay.motion import Motion, Segments, carry, dead_reckon, wrapped
 from auvest.replay.sources import Sources
 from auvest.replay.tables import Batch, Columns
 from auvest.replay.thinning import SAME_S, Thinning
 
 #: Velocity odometry is gone through in small steps: so many at once, so that memory stays bounded.
 _STEPS = 32768
+#: Files of which a line that is too late makes all after it wrong.
+_REQUIRED = ("odometry.csv", "compass.csv", "leaders.csv")
 #: So many steps without a line in any file are no log any more.
 _STEPS_WITHOUT_LINE = 5_000_000
 
@@ -63,23 +79,29 @@ class Replay(ABC):
     """
 
     listener: Callable[[GaussianFilter, Rows, Mapping[str, Any]], None] | None = None
-    _measured: str
+    #: Whether the state has a depth.
+    spatial = False
+    _filter: GaussianFilter
 
     def __init__(self, log: LogFolder, settings: Settings, filter_name: FilterName) -> None:
+        log = _early(log, settings)
         self.log = log
         self.settings = settings
         self.filter_name = filter_name
+        self._sources = Sources(log.beacons(), settings.log.leader_gap_s)
+        self.instruments = Instruments(log, settings, self._sources, spatial=self.spatial)
+        self._late_s = self.instruments.late_s
+        self._thinning = {
+            sensor: Thinning(every_s) for sensor, every_s in self.instruments.every_s.items()
+        }
         reorder_s = settings.log.reorder_s
-        names = [self._measured, "odometry.csv", "leaders.csv", "truth.csv"]
+        names = [*self.instruments.names, *_REQUIRED, "depth.csv", "truth.csv"]
         self.streams = {
-            name: Stream(
-                log[name], reorder_s=reorder_s, required=name in ("odometry.csv", "leaders.csv")
-            )
-            for name in names
+            name: Stream(log[name], reorder_s=reorder_s, required=name in _REQUIRED)
+            for name in dict.fromkeys(names)
             if name in log
         }
         self.start = self._start()
-        self._sources = Sources(log.beacons(), settings.log.leader_gap_s)
         self._waiting = {
             name: np.empty((0, len(stream.table.columns))) for name, stream in self.streams.items()
         }
@@ -95,26 +117,31 @@ class Replay(ABC):
             If the filter cannot do a step.
         """
         for chunk, horizon in merge(self.streams):
+            last = horizon == math.inf
             for name, rows in chunk.items():
                 if name == "odometry.csv":
-                    self._add_odometry(rows)
+                    self._add_odometry(rows, chunk.get("compass.csv"), last=last)
                 elif name == "leaders.csv":
-                    self._sources.add(rows)
-                else:
+                    self._add_leaders(rows)
+                elif name == "depth.csv" and name not in self.instruments.names:
+                    self.instruments.depths.add(rows)
+                elif name != "compass.csv":
                     self._waiting[name] = np.concatenate([self._waiting[name], rows])
-            limit = self._limit(horizon)
-            last = horizon == math.inf
+            limit = self._limit(horizon if last else horizon - self._late_s)
             if limit >= self.start[0] or last:
                 *inner, end = self._stretches(limit)
                 for stop in inner:
-                    yield self._placed(self._advance(stop, last=False))
-                yield self._placed(self._advance(end, last=last))
-                self._sources.forget(limit)
+                    yield self._with_places(self._advance(stop, last=False))
+                yield self._with_places(self._advance(end, last=last))
+                self._sources.forget(limit - self._late_s)
+                self.instruments.depths.forget(limit - self._late_s)
+                self.instruments.source_depths.forget(limit - self._late_s)
 
-    def _placed(self, batch: Batch) -> Batch:
+    def _with_places(self, batch: Batch) -> Batch:
         """Say where the sources of the measurements were, while that is known."""
         measured = batch.measurements
         places = self._sources.locate(measured["time_s"], measured["source"].astype(float))
+        places[~np.isin(measured["sensor"], ("range", "fix"))] = np.nan
         return replace(batch, places=places[:, :2])
 
     @property
@@ -131,7 +158,14 @@ class Replay(ABC):
     def _start(self) -> tuple[float, float, float, float]: ...
 
     @abstractmethod
-    def _add_odometry(self, rows: Rows) -> None: ...
+    def _add_odometry(self, rows: Rows, headings: Rows | None, *, last: bool) -> None: ...
+
+    def _add_leaders(self, rows: Rows) -> None:
+        table = self.log["leaders.csv"]
+        sigma = table.column(rows, "sigma_m", 0.0)
+        self._sources.add(np.column_stack([rows[:, :4], sigma]))
+        depth = table.column(rows, "depth_m", 0.0)
+        self.instruments.source_depths.add(np.column_stack([rows[:, :2], depth, 0 * depth]))
 
     @abstractmethod
     def _limit(self, horizon: float) -> float:
@@ -163,36 +197,99 @@ class Replay(ABC):
         """Start pose from the first line of start.csv or of a truth with headings."""
         if name not in self.log or "heading_rad" not in self.log[name].names:
             return None
+        time, x, y = self._first_place(name)
+        table = self.log[name]
+        rows, _ = next(table.chunks())
+        return time, x, y, float(table.column(rows, "heading_rad")[0])
+
+    def _first_place(self, name: str) -> tuple[float, float, float]:
+        """Give time, x and y of the first line of a file."""
         table = self.log[name]
         rows, _ = next(table.chunks(), (np.empty((0, 4)), 0))
         if len(rows) == 0:
             raise LogError(table.path, "has no line below the header")
-        time, x, y, heading = rows[0].tolist()
-        return time, x, y, heading
+        time, x, y = rows[0, :3].tolist()
+        return time, x, y
 
     def _usable_position(self, horizon: float) -> float:
-        """Time up to which positions of leaders can be had."""
+        """Time up to which positions of leaders and depths can be had."""
         if "leaders.csv" in self.streams:
             horizon -= self._sources.gap_s
+        depth = self.streams.get("depth.csv")
+        if "depth.csv" not in self.instruments.names and depth is not None:
+            known = math.inf if depth.horizon == math.inf else self.instruments.depths.known_until
+            horizon = min(horizon, known)
         return float(np.nextafter(horizon, -math.inf))
 
     def _measurements(
-        self, rows: Rows, end: float, thinning: Thinning
-    ) -> tuple[dict[str, npt.NDArray[Any]], Rows, npt.NDArray[np.bool_]]:
-        """Columns for these rows, places of their sources and which of them are used."""
-        columns = tables.blank_measurements(len(rows))
-        columns["time_s"] = rows[:, 0].copy()
-        columns["source"] = rows[:, 1].astype(np.int64)
-        places = self._sources.locate(rows[:, 0], rows[:, 1])
+        self, limit: float, end: float
+    ) -> tuple[Measured, dict[str, npt.NDArray[Any]], npt.NDArray[np.bool_]]:
+        """Take what came in up to a time: measurements, their columns and which are used."""
+        read = [self.instruments.read(name, self._take(name, limit)) for name in self._files]
+        measured = Measured.joined(read)
+        columns = tables.blank_measurements(len(measured))
+        columns["time_s"] = measured.time_s
+        columns["source"] = measured.source
+        columns["sensor"] = np.array(tables.SENSORS)[measured.sensor]
         outcome = columns["outcome"]
-        outcome[np.isnan(places[:, 0])] = tables.NO_POSITION
-        outcome[rows[:, 0] > end] = tables.AFTER_END
-        outcome[rows[:, 0] < self.start[0]] = tables.BEFORE_START
+        outcome[measured.too_short] = tables.TOO_SHORT
+        outcome[~measured.located] = tables.NO_POSITION
+        outcome[measured.time_s > end] = tables.AFTER_END
+        outcome[measured.taken_s < self.start[0]] = tables.BEFORE_START
         usable = outcome == ""
-        passed = thinning.passed(rows[usable, 0], rows[usable, 1])
-        held = np.flatnonzero(usable)[~passed]
-        outcome[held] = tables.HELD_OUT
-        return columns, places, outcome == ""
+        for sensor, thinning in self._thinning.items():
+            mine = np.flatnonzero(usable & (measured.sensor == sensor))
+            passed = thinning.passed(measured.time_s[mine], measured.source[mine].astype(float))
+            outcome[mine[~passed]] = tables.HELD_OUT
+        return measured, columns, outcome == ""
+
+    @property
+    def _files(self) -> list[str]:
+        return self.instruments.names
+
+    def _taken_late(self, limit: float) -> Rows:
+        """Give the times up to a limit at which something was taken that comes in later."""
+        if self._late_s == 0:
+            return np.empty(0)
+        parts = [
+            self._waiting[name][:, 0] - self.instruments.latency_s(name, self._waiting[name])
+            for name in self._files
+        ]
+        taken = np.concatenate(parts)
+        return taken[taken <= limit]
+
+    def _fused(
+        self, z: Rows, place: Rows, ages: Rows, measured: Measured, of_row: Rows, **rows: Rows
+    ) -> tuple[dict[str, npt.NDArray[Any]], list[RunResult]]:
+        """Take rows through the filter: what updates reported, and results.
+
+        One call per stretch of one sensor with one noise; ``of_row`` says which measurement a row
+        has, -1 where none. A row without one goes with the next that has one.
+        """
+        kinds = np.column_stack([measured.sensor, measured.noise])
+        models, model_of = _distinct(kinds)
+        there = np.flatnonzero(of_row >= 0)
+        if len(there):
+            following = np.searchsorted(there, np.arange(len(z)))
+            which = model_of[of_row[there[np.minimum(following, len(there) - 1)]]]
+        else:
+            which = np.zeros(len(z), int)
+        results = []
+        for part in np.split(np.arange(len(z)), np.flatnonzero(np.diff(which)) + 1):
+            if len(models):
+                kind = models[which[part[0]]]
+                sensor = self.instruments.model(int(kind[0]), kind[1:])
+            else:
+                sensor = next(iter(self._filter.sensors.values()))
+            options: dict[str, Any] = {name: values[part] for name, values in rows.items()}
+            size = _places(sensor)
+            if size:
+                options["place"] = place[part, :size]
+            if self._late_s > 0:
+                options["age_s"] = ages[part]
+            numbers = z[part, : len(sensor.measures)]
+            results.append(self._run_rows(self._filter, numbers, sensor=sensor, **options))
+        return updates_of(results), results
 
     def _errors(
         self, truth: Rows, position: Floats, covariance: Floats, reckoned: Floats
@@ -217,36 +314,44 @@ class Localiser(Replay):
     that has headings.
     """
 
-    _measured = "ranges.csv"
-
     def __init__(self, log: LogFolder, settings: Settings, filter_name: FilterName) -> None:
         if filter_name == "aukf":
             raise ValueError("filter aukf chooses when to take a fix; this log has ranges: use ukf")
         super().__init__(log, settings, filter_name)
         time, x, y, heading = self.start
         self._now = time
-        self._motion = Motion(log["odometry.csv"], time, settings.odometry)
-        self._thinning = Thinning(settings.ranges.every_s)
+        compass = "compass.csv" in log
+        self._motion = Motion(log["odometry.csv"], time, settings.odometry, compass=compass)
         start, noise = settings.start, settings.odometry
-        self._sensor = LeaderRange(sigma_range_m=settings.ranges.sigma_m)
         models: dict[str, Any] = {
             "process": Odometry(
                 sigma_distance=noise.sigma_distance,
                 sigma_drift=noise.sigma_drift,
                 sigma_turn=noise.sigma_turn,
+                sigma_turned=noise.sigma_turned,
             ),
-            "sensors": self._sensor,
+            "sensors": self._own_sensors(),
         }
         sigmas = [start.sigma_position_m, start.sigma_position_m, start.sigma_heading_rad]
         x0, P0 = np.array([x, y, heading]), np.diag(sigmas) ** 2
-        self._filter = _build(filter_name, settings, x0, P0, models)
+        self._filter = _build(filter_name, settings, x0, P0, models, self._late_s)
         # The state at `now`, and the pose by dead reckoning alone.
         self._x: Floats = x0[None]
         self._P: Floats = P0[None]
         self._reckoned = x0[None]
+        # States that a late measurement may be predicted from, before that.
+        self._past_s: Floats = np.empty(0)
+        self._past_x: Floats = np.empty((0, 3))
 
     def _start(self) -> tuple[float, float, float, float]:
-        start = self._from_file("start.csv") or self._from_file("truth.csv")
+        steered = "compass.csv" in self.log or "heading_rad" in self.log["odometry.csv"].names
+        start = self._from_file("start.csv")
+        if start is None and steered and "start.csv" in self.log:
+            start = self._headed("start.csv")
+        start = start or self._from_file("truth.csv")
+        if start is None and steered:
+            names = [name for name in ("truth.csv", "positions.csv") if name in self.log]
+            start = self._headed(names[0]) if names else None
         if start is None:
             raise LogError(
                 self.log.path, "has neither start.csv nor a truth.csv with heading_rad: "
@@ -254,12 +359,47 @@ class Localiser(Replay):
             )  # fmt: skip
         return start
 
-    def _add_odometry(self, rows: Rows) -> None:
-        self._motion.add(rows)
+    def _headed(self, name: str) -> tuple[float, float, float, float]:
+        """Give the start at the first place of a file, headed as the compass says then."""
+        time, x, y = self._first_place(name)
+        table = self.log["compass.csv" if "compass.csv" in self.log else "odometry.csv"]
+        before: list[tuple[float, float]] = []
+        for rows, _ in table.chunks():
+            heading = table.column(rows, "heading_rad")
+            k = int(np.searchsorted(rows[:, 0], time, side="left"))
+            if k < len(rows):
+                before.append((float(rows[k, 0]), float(heading[k])))
+            if k > 0:
+                before.insert(0, (float(rows[k - 1, 0]), float(heading[k - 1])))
+            if k < len(rows):
+                break
+            before = before[:1]
+        if not before:
+            raise LogError(table.path, "has no line below the header")
+        (low_s, low), (high_s, high) = before[0], before[-1]
+        share = min(max((time - low_s) / (high_s - low_s), 0.0), 1.0) if high_s > low_s else 0.0
+        turn = float(wrapped(np.array([high - low]))[0])
+        return time, x, y, low + share * turn + self.settings.compass.offset_rad
+
+    def _own_sensors(self) -> Any:
+        """Give the sensors of the log's files, with the noise of the settings."""
+        s = self.settings
+        noise = {
+            tables.RANGE: [s.ranges.sigma_m, 0.0, math.nan],
+            tables.FIX: [s.fixes.sigma_range_m, s.fixes.sigma_bearing_rad, math.nan],
+            tables.POSITION: [s.positions.sigma_m, s.positions.sigma_m, math.nan],
+        }
+        models = [
+            self.instruments.model(one, np.array(noise[one])) for one in self.instruments.sensors
+        ]
+        return models[0] if len(models) == 1 else models
+
+    def _add_odometry(self, rows: Rows, headings: Rows | None, *, last: bool) -> None:
+        self._motion.add(rows, headings, last=last)
 
     def _limit(self, horizon: float) -> float:
         limit = self._usable_position(horizon)
-        if self._motion.increments:
+        if self._motion.increments or (self._motion.steered and horizon < math.inf):
             limit = min(limit, self._motion.known_until)
         elif horizon == math.inf:
             ends = [rows[-1, 0] for rows in self._waiting.values() if len(rows)]
@@ -283,30 +423,45 @@ class Localiser(Replay):
         return [*np.arange(self._now + _STEPS * step, limit, _STEPS * step).tolist(), limit]
 
     def _advance(self, limit: float, *, last: bool) -> Batch:
-        ranges = self._take("ranges.csv", math.inf if last else limit)
-        columns, places, used = self._measurements(ranges, limit, self._thinning)
-        fused, where = ranges[used], places[used]
+        came, columns, used = self._measurements(math.inf if last else limit, limit)
+        fused = came[used]
         segments = self._motion.until(limit)
-        times = self._events(limit, fused[:, 0])
+        taken = fused.taken_s[fused.taken_s < fused.time_s] if self._late_s else np.empty(0)
+        ends = np.concatenate([fused.time_s, taken, self._taken_late(limit)])
+        times = self._events(limit, ends)
         bounds = np.concatenate([[self._now], times])
         chord, turn = segments.steps(bounds[:-1], np.diff(bounds))
 
-        # A row per step, and after it one per range taken at its end, with no time between.
-        after = np.searchsorted(times, fused[:, 0], side="right")
-        time = np.insert(times, after, fused[:, 0])
+        # A row per step, and after it one per measurement that came in at its end, with no time
+        # between.
+        after = np.searchsorted(times, fused.time_s, side="right")
+        time = np.insert(times, after, fused.time_s)
         x: Floats = np.empty((0, 3))
         covariance: Floats = np.empty((0, 3, 3))
         mixture = {name: np.empty(0, np.uint8) for name in tables.MIXTURE}
         located = np.empty(0, bool)
         if len(time):
             motion = np.insert(np.column_stack([chord.real, chord.imag, turn]), after, 0.0, axis=0)
-            z = np.insert(np.full(len(times), np.nan), after, fused[:, 2])
-            place = np.insert(np.full((len(times), 3), np.nan), after, where, axis=0)
-            dt = np.insert(np.diff(bounds), after, 0.0)
-            updates, x, covariance, mixture = self._run(z, dt, motion, place)
+            of_row = np.insert(np.full(len(times), -1), after, np.arange(len(fused)))
+            nothing = np.full((len(times), 3), np.nan)
+            updates, results = self._fused(
+                np.insert(nothing, after, fused.z, axis=0),
+                np.insert(nothing, after, fused.place, axis=0),
+                np.insert(np.zeros(len(times)), after, fused.time_s - fused.taken_s),
+                fused,
+                of_row,
+                dt=np.insert(np.diff(bounds), after, 0.0),
+                input=motion,
+            )
+            x = np.concatenate([result.x for result in results])
+            covariance = np.concatenate([result.P for result in results])
+            if self._filter.components > 1:
+                for name in tables.MIXTURE:
+                    mixture[name] = np.concatenate([getattr(result, name) for result in results])
             _fill(columns, np.flatnonzero(used), updates)
-            measured = ~np.isnan(z)
-            located = _located(covariance[measured], z[measured], updates["sigma"])
+            ranged = fused.sensor == tables.RANGE
+            sigma = np.hypot(fused.noise[ranged, 0], fused.noise[ranged, 1])
+            located = _located(covariance[of_row >= 0][ranged], fused.z[ranged, 0], sigma)
 
         # The state after the last row of each time, behind that before this stretch.
         final = np.flatnonzero(np.diff(time, append=math.inf) > 0)
@@ -316,10 +471,10 @@ class Localiser(Replay):
         poses = dead_reckon(self._reckoned, chord, turn)
         reckoned = poses[np.searchsorted(bounds, at, side="right") - 1]
 
-        held = np.flatnonzero(columns["outcome"] == tables.HELD_OUT)
-        predicted = carry(segments, states, at, ranges[held, 0])
-        distance = np.hypot(*(predicted - places[held, :2]).T)
-        columns["held_out_error_m"][held] = distance - ranges[held, 2]
+        self._predict_held_out(
+            came, columns, segments,
+            np.concatenate([self._past_x, states]), np.concatenate([self._past_s, at]),
+        )  # fmt: skip
         truth = self._take("truth.csv", limit)
         truth = truth[truth[:, 0] >= self.start[0]]
         errors = self._errors(
@@ -331,7 +486,12 @@ class Localiser(Replay):
 
         self._now, self._x, self._P = float(at[-1]), states[-1:], spreads[-1:]
         self._reckoned = reckoned[-1:]
-        self._motion.forget(self._now)
+        if self._late_s > 0:
+            past_s = np.concatenate([self._past_s, at[:-1]])
+            past_x = np.concatenate([self._past_x, states[:-1]])
+            k = int(np.searchsorted(past_s, self._now - self._late_s, side="right")) - 1
+            self._past_s, self._past_x = past_s[max(k, 0) :], past_x[max(k, 0) :]
+        self._motion.forget(self._past_s[0] if len(self._past_s) else self._now)
         estimates = _estimates(at[1:], states[1:], states[1:, 2], spreads[1:], reckoned[1:])
         if self._filter.components > 1:
             said, size = (mixture[name][final] for name in tables.MIXTURE)
@@ -341,9 +501,27 @@ class Localiser(Replay):
             estimates=estimates,
             measurements=columns,
             errors=errors,
-            ranges_m=ranges[:, 2],
+            ranges_m=came.range_m,
             located=located,
         )
+
+    def _predict_held_out(
+        self,
+        came: Measured,
+        columns: dict[str, npt.NDArray[Any]],
+        segments: Segments,
+        states: Floats,
+        at: Rows,
+    ) -> None:
+        """Write how far the predictions of what the filter did not get were off."""
+        held = np.flatnonzero(columns["outcome"] == tables.HELD_OUT)
+        predicted = carry(segments, states, at, came.taken_s[held])
+        error = columns["held_out_error_m"]
+        error[held] = np.hypot(*(predicted - came.place[held, :2]).T) - came.z[held, 0]
+        for sensor, seen in ((tables.FIX, _pointed), (tables.POSITION, _placed)):
+            mine = came.sensor[held] == sensor
+            if mine.any():
+                error[held[mine]] = np.hypot(*(predicted[mine] - seen(came[held[mine]])).T)
 
     def _events(self, limit: float, measured: Rows) -> Rows:
         """Give the times in (now, limit] at which a step ends.
@@ -361,71 +539,53 @@ class Localiser(Replay):
             parts.append(grid[(grid > self._now) & (grid <= limit)])
         return np.unique(np.concatenate(parts))
 
-    def _run(
-        self, z: Rows, dt: Rows, motion: Rows, place: Rows
-    ) -> tuple[dict[str, npt.NDArray[Any]], Floats, Floats, dict[str, npt.NDArray[Any]]]:
-        """Rows through the filter: updates, states, covariances, and what it says of its mixture.
-
-        One call per stretch in which the leaders' positions are known equally well.
-        """
-        spread = np.where(np.isnan(z), -1.0, place[:, 2])
-        spread = spread[np.maximum.accumulate(np.where(spread >= 0, np.arange(len(z)), 0))]
-        cuts = np.flatnonzero(np.diff(spread)) + 1
-        results, sigmas = [], []
-        for part in np.split(np.arange(len(z)), cuts):
-            sensor = replace(self._sensor, sigma_leader_m=max(float(spread[part[-1]]), 0.0))
-            result = self._run_rows(
-                self._filter,
-                z[part],
-                dt=dt[part],
-                input=motion[part],
-                place=place[part, :2],
-                sensor=sensor,
-            )
-            results.append(result)
-            sigma = math.hypot(sensor.sigma_range_m, sensor.sigma_leader_m)
-            sigmas.append(np.full(int((~np.isnan(z[part])).sum()), sigma))
-        mixture = {}
-        if self._filter.components > 1:
-            for name in tables.MIXTURE:
-                mixture[name] = np.concatenate([getattr(result, name) for result in results])
-        return (
-            {**updates_of(results), "sigma": np.concatenate(sigmas)},
-            np.concatenate([result.x for result in results]),
-            np.concatenate([result.P for result in results]),
-            mixture,
-        )
-
 
 class Tracker(Replay):
-    """A station, or several, that track a craft by range and bearing.
+    """A station, or several, that track a craft by range and bearing; or fixes of a craft.
 
-    The state is position, velocity and acceleration. The run starts at the position in start.csv,
-    else at the first fix, at rest.
+    The state is position, velocity and acceleration, or with elevations position and velocity in
+    space, depth downwards. The run starts at the position in start.csv, else at the first fix, at
+    rest.
     """
-
-    _measured = "fixes.csv"
 
     def __init__(self, log: LogFolder, settings: Settings, filter_name: FilterName) -> None:
         if settings.filter.components > 1 or settings.filter.headings > 1:
             raise ValueError("[filter] components and headings are for logs of ranges")
+        if "fixes.csv" in log:
+            self.spatial = "elevation_rad" in log["fixes.csv"].names
+        else:
+            self.spatial = "depth_m" in log["positions.csv"].names
         super().__init__(log, settings, filter_name)
-        fixes = settings.fixes
-        self._process = ConstantAcceleration(**vars(settings.process))
-        self._sensor = RangeBearing(
-            sigma_range_m=fixes.sigma_range_m,
-            sigma_bearing_rad=fixes.sigma_bearing_rad,
-            near_field=fixes.near_field,
+        if filter_name == "aukf" and (self._files != ["fixes.csv"] or self._late_s > 0):
+            raise ValueError(
+                "filter aukf chooses when to take the next fix, and so takes no other sensor and "
+                "none that is late: use ukf"
+            )
+        process = settings.process
+        self._process: ProcessModel = ConstantAcceleration(
+            position_psd=process.position_psd,
+            velocity_psd=process.velocity_psd,
+            acceleration_psd=process.acceleration_psd,
+            discretisation=process.discretisation,
         )
-        self._thinning = Thinning(fixes.every_s)
+        if self.spatial:
+            self._process = WhiteAcceleration(
+                axes=3,
+                velocity_psd=process.velocity_psd,
+                vertical_velocity_psd=process.vertical_velocity_psd,
+            )
         self._now = self.start[0]
         self._started = False
+        self._past_s: Floats = np.empty(0)
+        self._past_x: Floats = np.empty((0, 6))
 
     def _start(self) -> tuple[float, float, float, float]:
         start = self._from_file("start.csv")
+        if start is None and "start.csv" in self.log:
+            start = (*self._first_place("start.csv"), 0.0)
         return start if start is not None else (-math.inf, math.nan, math.nan, 0.0)
 
-    def _add_odometry(self, rows: Rows) -> None:
+    def _add_odometry(self, rows: Rows, headings: Rows | None, *, last: bool) -> None:  # noqa: ARG002
         raise AssertionError(f"a tracked craft has no odometry, but {len(rows)} lines came")
 
     def _limit(self, horizon: float) -> float:
@@ -435,45 +595,56 @@ class Tracker(Replay):
         self.start = (time, float(position[0]), float(position[1]), 0.0)
         s = self.settings.start
         sigmas = [s.sigma_position_m, s.sigma_speed_m_s, s.sigma_acceleration_m_s2]
-        x0 = np.array([*position, 0.0, 0.0, 0.0, 0.0])
-        P0 = np.diag(np.repeat(sigmas, 2)) ** 2
-        models: dict[str, Any] = {"process": self._process, "sensors": self._sensor}
+        fixes = self.settings.fixes
+        models: dict[str, Any] = {"process": self._process}
+        if self.spatial:
+            x0 = np.array([*position[:3], 0.0, 0.0, 0.0])
+            P0 = np.diag(np.repeat(sigmas[:2], 3)) ** 2
+        else:
+            x0 = np.array([*position[:2], 0.0, 0.0, 0.0, 0.0])
+            P0 = np.diag(np.repeat(sigmas, 2)) ** 2
+            models["sensors"] = RangeBearing(
+                sigma_range_m=fixes.sigma_range_m,
+                sigma_bearing_rad=fixes.sigma_bearing_rad,
+                near_field=fixes.near_field,
+            )
         if self.filter_name == "aukf":
             policy = interval_policy(self.settings.interval)
-            alpha = self.settings.filter.alpha
-            self._filter: GaussianFilter = Aukf(x0, P0, policy=policy, alpha=alpha, **models)
+            models |= {**_points(self.settings), "dtype": self.settings.filter.dtype}
+            models["longest_step_s"] = self.settings.filter.longest_step_s
+            self._filter = Aukf(x0, P0, policy=policy, **models)
         else:
-            self._filter = _build(self.filter_name, self.settings, x0, P0, models)
+            self._filter = _build(self.filter_name, self.settings, x0, P0, models, self._late_s)
         self._now, self._started = time, True
         self._x: Floats = x0[None]
         self._P: Floats = P0[None]
 
-    def _advance(self, limit: float, *, last: bool) -> Batch:  # noqa: ARG002
-        fixes = self._take("fixes.csv", limit)
-        columns, places, used = self._measurements(fixes, math.inf, self._thinning)
-        seen = places[:, :2] + fixes[:, 2:3] * np.column_stack(
-            [np.cos(fixes[:, 3]), np.sin(fixes[:, 3])]
-        )
+    def _advance(self, limit: float, *, last: bool) -> Batch:
+        came, columns, used = self._measurements(math.inf if last else limit, math.inf)
         if not self._started and math.isfinite(self.start[0]):
-            self._begin(self.start[0], np.array(self.start[1:3]))
-        if not self._started and used.any():
-            first = int(np.argmax(used))
-            self._begin(float(fixes[first, 0]), seen[first])
-            columns["outcome"][first] = tables.ACCEPTED
-            used[first] = False
+            self._begin(self.start[0], np.array([*self.start[1:3], self._first_depth(came)]))
         if not self._started:
-            return _nothing(columns, fixes[:, 2])
+            self._begin_at_first(came, columns, used)
+        if not self._started:
+            return _nothing(columns, came.range_m)
 
+        times: Rows = came.time_s[used]
         if isinstance(self._filter, Aukf):
-            x, covariance, used = self._sample(self._filter, fixes, places, used, columns)
+            x, covariance, used = self._sample(self._filter, came, used, columns)
+            times = came.time_s[used]
         else:
-            x, covariance = self._fuse(self._filter, fixes[used], places[used], used, columns)
-        at = np.concatenate([[self._now], fixes[used, 0]])
+            if self._late_s > 0:
+                waiting = self._taken_late(limit)
+                edges = np.concatenate([came.taken_s[used], waiting])
+                times = np.concatenate([times, edges[edges > self._now]])
+            times, x, covariance = self._fuse(came[used], np.flatnonzero(used), times, columns)
+        at = np.concatenate([[self._now], times])
         states = np.concatenate([self._x, x])
         spreads = np.concatenate([self._P, covariance])
-        held = np.flatnonzero(columns["outcome"] == tables.HELD_OUT)
-        predicted = self._carry(states, at, fixes[held, 0])
-        columns["held_out_error_m"][held] = np.hypot(*(predicted - seen[held]).T)
+        self._predict_held_out(
+            came, columns, np.concatenate([self._past_x, states]),
+            np.concatenate([self._past_s, at]),
+        )  # fmt: skip
 
         truth = self._take("truth.csv", limit)
         truth = truth[truth[:, 0] >= self.start[0]]
@@ -481,35 +652,102 @@ class Tracker(Replay):
         nowhere = np.full((len(truth), 2), np.nan)
         position = self._carry(states, at, truth[:, 0])
         self._now, self._x, self._P = float(at[-1]), states[-1:], spreads[-1:]
-        course = np.arctan2(states[1:, 3], states[1:, 2])
+        if self._late_s > 0:
+            past_s = np.concatenate([self._past_s, at[:-1]])
+            k = int(np.searchsorted(past_s, self._now - self._late_s, side="right")) - 1
+            self._past_s = past_s[max(k, 0) :]
+            self._past_x = np.concatenate([self._past_x, states[:-1]])[max(k, 0) :]
+        v = 3 if self.spatial else 2
+        course = np.arctan2(states[1:, v + 1], states[1:, v])
+        estimates = _estimates(at[1:], states[1:], course, spreads[1:], None)
+        if self.spatial:
+            depth = (states[1:, 2], spreads[1:, 2, 2])
+            estimates = {**estimates, **dict(zip(tables.SPATIAL, depth, strict=True))}
         return Batch(
-            estimates=_estimates(at[1:], states[1:], course, spreads[1:], None),
+            estimates=estimates,
             measurements=columns,
             errors=self._errors(truth, position, spreads[last_row], nowhere),
-            ranges_m=fixes[:, 2],
+            ranges_m=came.range_m,
         )
+
+    def _begin_at_first(
+        self,
+        came: Measured,
+        columns: dict[str, npt.NDArray[Any]],
+        used: npt.NDArray[np.bool_],
+    ) -> None:
+        """Start at the first place that is told; what came before that is before the start."""
+        places = used & np.isin(came.sensor, (tables.FIX, tables.POSITION))
+        if not places.any():
+            columns["outcome"][used] = tables.BEFORE_START
+            used[:] = False
+            return
+        first = int(np.argmax(places))
+        seen = (_pointed if came.sensor[first] == tables.FIX else _placed)(came[first : first + 1])
+        depth = [self._first_depth(came[first:])]
+        self._begin(float(came.taken_s[first]), np.concatenate([seen[0], depth]))
+        columns["outcome"][first] = tables.ACCEPTED
+        early = used & (came.taken_s < self.start[0])
+        columns["outcome"][early] = tables.BEFORE_START
+        used[early] = False
+        used[first] = False
+
+    def _first_depth(self, came: Measured) -> float:
+        """Give the depth that the first measurement tells which tells one; 0 where none does."""
+        for k in range(len(came)) if self.spatial else ():
+            if came.sensor[k] == tables.DEPTH:
+                return float(came.z[k, 0])
+            if came.sensor[k] == tables.FIX and not np.isnan(came.place[k, 2]):
+                return float(came.place[k, 2] + came.z[k, 0] * np.sin(came.z[k, 2]))
+            if came.sensor[k] == tables.POSITION and not np.isnan(came.z[k, 2]):
+                return float(came.z[k, 2])
+        return 0.0
+
+    def _predict_held_out(
+        self, came: Measured, columns: dict[str, npt.NDArray[Any]], states: Rows, at: Rows
+    ) -> None:
+        """Write how far the predictions of what the filter did not get were off."""
+        held = np.flatnonzero(columns["outcome"] == tables.HELD_OUT)
+        predicted = self._carry(states, at, came.taken_s[held])
+        seen = np.where(
+            (came.sensor[held] == tables.FIX)[:, None], _pointed(came[held]), _placed(came[held])
+        )
+        columns["held_out_error_m"][held] = np.hypot(*(predicted - seen).T)
 
     def _fuse(
         self,
-        tracker: GaussianFilter,
-        fixes: Rows,
-        places: Rows,
-        used: npt.NDArray[np.bool_],
+        fused: Measured,
+        of_table: npt.NDArray[np.intp],
+        times: Rows,
         columns: dict[str, npt.NDArray[Any]],
-    ) -> tuple[Floats, Floats]:
-        """Update with these fixes: states and covariances after each."""
-        if len(fixes) == 0:
-            return np.empty((0, 6)), np.empty((0, 6, 6))
-        dt = np.diff(fixes[:, 0], prepend=self._now)
-        result = self._run_rows(tracker, fixes[:, 2:4], dt=dt, place=places[:, :2])
-        _fill(columns, np.flatnonzero(used), updates_of([result]))
-        return result.x, result.P
+    ) -> tuple[Rows, Floats, Floats]:
+        """Update with these measurements: times, states and covariances after each."""
+        empty = np.empty(0), np.empty((0, 6)), np.empty((0, 6, 6))
+        if len(times) == 0:
+            return empty
+        # Steps that end where something was taken that came in later are rows without measurement.
+        bare = np.setdiff1d(times, fused.time_s)
+        after = np.searchsorted(bare, fused.time_s, side="right")
+        time = np.insert(bare, after, fused.time_s)
+        of_row = np.insert(np.full(len(bare), -1), after, np.arange(len(fused)))
+        nothing = np.full((len(bare), 3), np.nan)
+        updates, results = self._fused(
+            np.insert(nothing, after, fused.z, axis=0),
+            np.insert(nothing, after, fused.place, axis=0),
+            np.insert(np.zeros(len(bare)), after, fused.time_s - fused.taken_s),
+            fused,
+            of_row,
+            dt=np.diff(time, prepend=self._now),
+        )
+        _fill(columns, of_table, updates)
+        x = np.concatenate([result.x for result in results])
+        covariance = np.concatenate([result.P for result in results])
+        return time, x, covariance
 
     def _sample(
         self,
         tracker: Aukf,
-        fixes: Rows,
-        places: Rows,
+        came: Measured,
         offered: npt.NDArray[np.bool_],
         columns: dict[str, npt.NDArray[Any]],
     ) -> tuple[Floats, Floats, npt.NDArray[np.bool_]]:
@@ -519,17 +757,19 @@ class Tracker(Replay):
         spreads: list[Floats] = [np.empty((0, 6, 6))]
         now = self._now
         for k in np.flatnonzero(offered).tolist():
-            if fixes[k, 0] - now < tracker.interval - SAME_S:
+            time = float(came.time_s[k])
+            if time - now < tracker.interval - SAME_S:
                 columns["outcome"][k] = tables.HELD_OUT
                 continue
-            station = (float(places[k, 0]), float(places[k, 1]))
+            sensor = self.instruments.model(tables.FIX, came.noise[k])
+            z, place = came.z[k : k + 1, :2], came.place[k : k + 1, :2]
             if self.listener is not None:
-                row = {"dt": fixes[k : k + 1, 0] - now, "place": places[k : k + 1, :2]}
-                self.listener(tracker, fixes[k : k + 1, 2:4], row)
-            tracker.predict(fixes[k, 0] - now)
-            tracker.update(fixes[k, 2:4], place=station)
+                row = {"dt": np.array([time - now]), "place": place, "sensor": sensor}
+                self.listener(tracker, z, row)
+            tracker.predict(time - now)
+            tracker.update(z[0], sensor, place=place[0])
             tracker.feedback()
-            now, used[k] = float(fixes[k, 0]), True
+            now, used[k] = time, True
             states.append(tracker.x[None])
             spreads.append(tracker.P[None])
             columns["outcome"][k] = tables.ACCEPTED
@@ -545,24 +785,91 @@ class Tracker(Replay):
         """Predicted positions at these times, each from the last state before it."""
         k = np.searchsorted(at, time_s, side="right") - 1
         dt = (time_s - at[k])[:, None]
+        if self.spatial:
+            return states[k, 0:2] + dt * states[k, 3:5]
         half_square = 0.5 * dt * dt
         return states[k, 0:2] + dt * states[k, 2:4] + half_square * states[k, 4:6]
 
 
+def _pointed(fixes: Measured) -> Rows:
+    """Where fixes by range and bearing point to in the plane."""
+    level = fixes.z[:, 0] * np.cos(np.nan_to_num(fixes.z[:, 2]))
+    bearing = fixes.z[:, 1]
+    return fixes.place[:, :2] + level[:, None] * np.column_stack([np.cos(bearing), np.sin(bearing)])
+
+
+def _placed(positions: Measured) -> Rows:
+    return positions.z[:, :2]
+
+
+def _early(log: LogFolder, settings: Settings) -> LogFolder:
+    """Give the log with the lines of what drives, or levels, at the times that they are about."""
+    latencies = {
+        "odometry.csv": settings.odometry.latency_s,
+        "compass.csv": settings.compass.latency_s,
+        "depth.csv": settings.depth.latency_s,
+    }
+    if log.tracking:  # there a depth is a measurement
+        latencies = {}
+    changes = {
+        name: columns_changed({0: partial(_before, late)})
+        for name, late in latencies.items()
+        if late > 0 and name in log
+    }
+    return ChangedLog(log, changes) if changes else log
+
+
+def _before(late_s: float, rows: Rows) -> Rows:
+    return rows[:, 0] - late_s
+
+
+def _distinct(kinds: Rows) -> tuple[Rows, npt.NDArray[np.intp]]:
+    """Give the distinct rows, in the order in which they come, and which of them each row is."""
+    if len(kinds) == 0:
+        return kinds, np.empty(0, np.intp)
+    plain = np.where(np.isnan(kinds), -1.0, kinds)
+    if (plain == plain[0]).all():
+        return kinds[:1], np.zeros(len(kinds), np.intp)
+    _, first, inverse = np.unique(plain, axis=0, return_index=True, return_inverse=True)
+    return kinds[first], inverse.reshape(-1)
+
+
+def _places(sensor: MeasurementModel) -> int:
+    """Say how many numbers the place of a sensor has."""
+    if sensor.place is None:
+        return 0
+    place = getattr(sensor, sensor.place)
+    return len(place) if isinstance(place, tuple) else 1
+
+
 def _build(
-    name: FilterName, settings: Settings, x0: Rows, P0: Rows, models: dict[str, Any]
+    name: FilterName,
+    settings: Settings,
+    x0: Rows,
+    P0: Rows,
+    models: dict[str, Any],
+    late_s: float,
 ) -> GaussianFilter:
     """Make the filter of this name, with what the settings say of its kind."""
     entry = registry.filter_named(name, registry.replayable())
     kind: type[GaussianFilter] = getattr(auvest, entry.cls)
     models["longest_step_s"] = settings.filter.longest_step_s
+    models["late_s"] = late_s
     models["components"] = settings.filter.components
     models["headings"] = settings.filter.headings
+    models["dtype"] = settings.filter.dtype
     if issubclass(kind, (RobustEkf, RobustUkf)):
-        models["kernel"] = settings.filter.kernel
+        models["kernel"], models["recovery"] = settings.robust
+        for key in ("residual", "max_iterations", "tolerance"):
+            models[key] = getattr(settings.filter, key)
     if issubclass(kind, Ukf):
-        models["alpha"] = settings.filter.alpha
+        models |= _points(settings)
     return kind(x0, P0, **models)
+
+
+def _points(settings: Settings) -> dict[str, float | None]:
+    """Give the parameters of the sigma points."""
+    return {key: getattr(settings.filter, key) for key in ("alpha", "beta", "kappa")}
 
 
 def interval_policy(settings: IntervalSettings) -> IntervalPolicy:
@@ -570,19 +877,37 @@ def interval_policy(settings: IntervalSettings) -> IntervalPolicy:
     if settings.policy == "fixed":
         return FixedInterval(interval_s=settings.interval_s)
     low, high = settings.min_s, settings.max_s
+    limits: dict[str, Any] = {"initial_s": settings.initial_s or low, "min_s": low, "max_s": high}
     if settings.policy == "mahalanobis":
-        return MahalanobisInterval(initial_s=low, min_s=low, max_s=high)
-    sigma = settings.position_sigma_m
-    return CovarianceBudget(initial_s=low, min_s=low, max_s=high, position_sigma_m=sigma)
+        names = ("tau0", "scale", "epsilon", "gamma1_m2", "gamma2", "ratio_max", "tau_min",
+                 "tau_max")  # fmt: skip
+        given = {name: getattr(settings, name) for name in names}
+        said = {name: value for name, value in given.items() if value is not None}
+        return MahalanobisInterval(**limits, **said)
+    return CovarianceBudget(position_sigma_m=settings.position_sigma_m, **limits)
 
 
 def updates_of(results: list[RunResult]) -> dict[str, npt.NDArray[Any]]:
-    """Gather what the updates in these results reported, a row per measurement."""
+    """Gather what the updates in these results reported, a row per measurement.
+
+    Behind the numbers of smaller measurements there is NaN.
+    """
     columns: dict[str, npt.NDArray[Any]] = {}
     there = np.concatenate([~np.isnan(result.nis) for result in results])
-    for name in ("innovation", "S", "weight", "nis", "near_field", "decision", "recovered"):
-        columns[name] = np.concatenate([getattr(result, name) for result in results])[there]
-    return columns
+    size = max(result.innovation.shape[1] for result in results)
+    for name in ("innovation", "weight"):
+        columns[name] = np.concatenate([_widened(getattr(one, name), size) for one in results])
+    spread = [np.sqrt(np.diagonal(one.S, axis1=1, axis2=2)) for one in results if one.S is not None]
+    columns["sigma"] = np.concatenate([_widened(one, size) for one in spread])
+    for name in ("nis", "near_field", "decision", "recovered"):
+        columns[name] = np.concatenate([getattr(result, name) for result in results])
+    return {name: values[there] for name, values in columns.items()}
+
+
+def _widened(rows: Rows, size: int) -> Rows:
+    if rows.shape[1] == size:
+        return rows
+    return np.pad(rows, ((0, 0), (0, size - rows.shape[1])), constant_values=np.nan)
 
 
 def _fill(
@@ -593,7 +918,7 @@ def _fill(
     """Write what the updates reported into the rows of the measurement table."""
     for m in range(updates["innovation"].shape[1]):
         columns[f"innovation_{m}"][rows] = updates["innovation"][:, m]
-        columns[f"sigma_{m}"][rows] = np.sqrt(updates["S"][:, m, m])
+        columns[f"sigma_{m}"][rows] = updates["sigma"][:, m]
         columns[f"weight_{m}"][rows] = updates["weight"][:, m]
     columns["nis"][rows] = updates["nis"]
     columns["near_field"][rows] = updates["near_field"]

@@ -66,6 +66,8 @@ def _innovation(axes: Axes, result: Result, m: int) -> None:
     rows, doubted = result.measurements.columns(), result.outliers.columns()
     # Near the station the innovation is a position error and has no place among these.
     known = ~np.isnan(rows[f"innovation_{m}"]) & (rows["near_field"] == 0)
+    ranged = np.isin(rows["sensor"], ("range", "fix"))
+    known &= ranged if ranged.any() else rows["sensor"] == "position"
     time, bound = rows["time_s"][known], 3 * rows[f"sigma_{m}"][known]
     value = rows[f"innovation_{m}"][known]
     order = np.argsort(time, kind="stable")
@@ -79,7 +81,8 @@ def _innovation(axes: Axes, result: Result, m: int) -> None:
         rejected = doubted["time_s"][away], doubted[f"innovation_{m}"][away]
         axes.plot(*rejected, "x", color=colour, markersize=5, label=tables.REJECTED)
     _compress(axes, value, 4 * float(np.quantile(bound, 0.9)) if len(bound) else 1.0)
-    plots.style(axes, ylabel=("range / m", "bearing / rad")[m])
+    names = ("range / m", "bearing / rad") if ranged.any() else ("x / m", "y / m")
+    plots.style(axes, ylabel=names[m])
     _legend(axes)
 
 

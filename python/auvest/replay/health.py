@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from auvest._arguments import Floats
 from auvest.logs.findings import Finding, Verdict, finding, worst
 from auvest.replay import tables
 from auvest.replay.samples import Samples
@@ -24,10 +25,10 @@ from auvest.replay.tables import Batch, Columns
 
 #: Measurements that are kept to be judged: evenly taken from all, so that memory stays bounded.
 KEPT = 20_000
-#: A measurement is within three sigma if its NIS is below these, for one number and for two.
-WITHIN = {1: 9.0, 2: 11.829}
+#: A measurement is within three sigma if its NIS is below these, by its numbers.
+WITHIN = {1: 9.0, 2: 11.829, 3: 14.156}
 #: 95 % of a consistent filter's NIS lie below these.
-BELOW_95 = {1: 3.841, 2: 5.991}
+BELOW_95 = {1: 3.841, 2: 5.991, 3: 7.815}
 #: Fewer measurements than this say nothing.
 FEW = 12
 #: Share beyond three sigma that makes a replay doubtful, and not to be trusted; clean acoustic
@@ -58,12 +59,13 @@ WHY = {
     tables.BEFORE_START: "before the start",
     tables.AFTER_END: "after the last line of the odometry",
     tables.NO_POSITION: "of a source whose position is not known then",
+    tables.TOO_SHORT: "shorter than the difference in depth",
 }
 
 #: What a replay keeps of each measurement.
 COLUMNS = (
     "time_s", "source", "outcome", "innovation_0", "innovation_1", "sigma_0", "sigma_1",
-    "near_field", "nis", "recovered", "range_m",
+    "near_field", "nis", "recovered", "range_m", "sensor", "innovation_2", "sigma_2",
 )  # fmt: skip
 
 
@@ -147,6 +149,7 @@ class Residuals:
         self.recoveries = 0
         self.unused: Counter[tuple[int, str]] = Counter()  # by source and outcome
         self.lines: Counter[int] = Counter()  # by source
+        self.sensors: Counter[str] = Counter()
         self.ranges = 0
         self.lost = 0  # ranges until the first that told where the craft is
         self.convergence = ""
@@ -160,6 +163,7 @@ class Residuals:
         self.recoveries += int(measured["recovered"].sum())
         rows = {**measured, "range_m": batch.ranges_m}
         self._samples.add(rows)
+        self.sensors.update(measured["sensor"].tolist())
         for source in np.unique(measured["source"]).tolist():
             mine = measured["source"] == source
             self.lines[int(source)] += int(mine.sum())
@@ -193,9 +197,34 @@ class Residuals:
         return {name: np.concatenate([part[name] for part in parts]) for name in COLUMNS}
 
 
-def numbers_measured(rows: Columns) -> int:
-    """How many numbers a measurement has: a range, or range and bearing."""
-    return 2 if (~np.isnan(rows["innovation_1"])).any() else 1
+def numbers_of(rows: Columns) -> npt.NDArray[np.int64]:
+    """How many numbers each measurement has: a range one, range and bearing two."""
+    more = [~np.isnan(rows[name]) for name in ("innovation_1", "innovation_2")]
+    return 1 + more[0].astype(np.int64) + more[1].astype(np.int64)
+
+
+def _of_numbers(values: Mapping[int, float], numbers: npt.NDArray[np.int64]) -> Floats:
+    """Give each measurement the value for its numbers."""
+    table = np.array([math.nan, *(values[k] for k in sorted(values))])
+    found: Floats = table[numbers]
+    return found
+
+
+def within(rows: Columns) -> npt.NDArray[np.bool_]:
+    """Say which measurements are within three sigma."""
+    inside: npt.NDArray[np.bool_] = rows["nis"] < _of_numbers(WITHIN, numbers_of(rows))
+    return inside
+
+
+def _expected(rows: Columns) -> tuple[float, float]:
+    """Mean and spread of a consistent filter's NIS within three sigma, in these rows."""
+    kinds, counts = np.unique(numbers_of(rows), return_counts=True)
+    moments = [truncated_moments(k, WITHIN[k]) for k in kinds.tolist()]
+    if len(moments) == 1:
+        return moments[0]
+    mean = float(np.average([one[0] for one in moments], weights=counts))
+    square = float(np.average([one[1] ** 2 for one in moments], weights=counts))
+    return mean, math.sqrt(square)
 
 
 def truncated_moments(numbers: int, limit: float) -> tuple[float, float]:
@@ -212,13 +241,12 @@ def findings(residuals: Residuals) -> list[Finding]:
     """Say what the innovations of a replay show, without asking why."""
     rows = residuals.rows()
     count = len(rows["nis"])
-    found = _unused(residuals, numbers_measured(rows))
+    found = _unused(residuals)
     if count < FEW:
         return found
-    numbers = numbers_measured(rows)
-    within = rows["nis"] < WITHIN[numbers]
-    beyond = 1 - float(within.mean())
-    found += _beginning(residuals.beginning(), numbers, beyond)
+    inside = within(rows)
+    beyond = 1 - float(inside.mean())
+    found += _beginning(residuals.beginning(), beyond)
     blind = float(_blind(rows).mean())
     if blind > BEYOND_DOUBTFUL:
         message = (
@@ -232,7 +260,8 @@ def findings(residuals: Residuals) -> list[Finding]:
         verdict: Verdict = "not_trusted" if bad else "doubtful"
         found.append(finding("innovations", message, verdict=verdict))
     else:
-        mean = float(rows["nis"][within].mean()) / truncated_moments(numbers, WITHIN[numbers])[0]
+        kept = {name: values[inside] for name, values in rows.items()}
+        mean = float(kept["nis"].mean()) / _expected(kept)[0]
         if mean > NIS_DOUBTFUL:
             message = (
                 f"innovations are {math.sqrt(mean):.2g} times as large as the settings say, "
@@ -247,17 +276,18 @@ def findings(residuals: Residuals) -> list[Finding]:
         )
         bad = residuals.recoveries >= RECOVERIES_NOT_TRUSTED
         found.append(finding("recoveries", message, verdict="not_trusted" if bad else "doubtful"))
-    return found + _apart(rows, within)
+    return found + _apart(rows, inside)
 
 
-def _unused(residuals: Residuals, numbers: int) -> list[Finding]:
+def _unused(residuals: Residuals) -> list[Finding]:
     """Find measurements that no filter was given."""
-    file = "fixes.csv" if numbers == 2 else "ranges.csv"
+    files = {"range": "ranges.csv", "fix": "fixes.csv", "position": "positions.csv"}
+    file = next((files[one] for one in files if residuals.sensors[one]), "ranges.csv")
     lines = sum(residuals.lines.values())
     found = []
     for source, of_source in sorted(residuals.lines.items()):
         unknown = residuals.unused[source, tables.NO_POSITION]
-        if unknown == of_source:
+        if unknown == of_source and source >= 0:
             message = (
                 f"source {source}: its position is known at none of its {of_source} lines: is its "
                 "number in beacons.csv or leaders.csv, and has leaders.csv the same clock?"
@@ -281,17 +311,19 @@ def _blind(rows: Columns) -> npt.NDArray[np.bool_]:
 
     To a filter that has lost its track altogether everything fits.
     """
-    blind: npt.NDArray[np.bool_] = rows["sigma_0"] > rows["range_m"].max(initial=0.0)
-    return blind & (rows["near_field"] == 0)
+    ranged = ~np.isnan(rows["range_m"])
+    blind: npt.NDArray[np.bool_] = rows["sigma_0"] > rows["range_m"][ranged].max(initial=0.0)
+    return blind & ranged & (rows["near_field"] == 0)
 
 
-def _beginning(rows: Columns, numbers: int, beyond: float) -> list[Finding]:
+def _beginning(rows: Columns, beyond: float) -> list[Finding]:
     """Find a start that does not fit: the first measurements are beyond three sigma."""
-    out = rows["nis"] >= WITHIN[numbers]
+    out = ~within(rows)
     first = len(out) if out.all() else int(np.argmin(out))
     if first < START_ASTRAY:
         return []
-    plain = np.flatnonzero(rows["near_field"][:first] == 0)
+    plain = np.flatnonzero((rows["near_field"] == 0) & ~np.isnan(rows["range_m"]))
+    plain = plain[plain < first]
     measured = rows["range_m"][plain]
     expected = np.maximum(np.abs(measured - rows["innovation_0"][plain]), 1e-3)
     ratio = float(np.median(measured / expected)) if len(plain) else 1.0
@@ -310,11 +342,11 @@ def _beginning(rows: Columns, numbers: int, beyond: float) -> list[Finding]:
     return [finding("start_off", message)]
 
 
-def _apart(rows: Columns, within: npt.NDArray[np.bool_]) -> list[Finding]:
+def _apart(rows: Columns, inside: npt.NDArray[np.bool_]) -> list[Finding]:
     """Find a source whose measurements are thrown away while the others' are not."""
     shares = {
-        int(source): 1 - float(within[rows["source"] == source].mean())
-        for source in np.unique(rows["source"])
+        int(source): 1 - float(inside[rows["source"] == source].mean())
+        for source in np.unique(rows["source"][rows["source"] >= 0])
         if (rows["source"] == source).sum() >= FEW
     }
     found = []
@@ -367,50 +399,50 @@ def health(residuals: Residuals, found: Iterable[Finding]) -> Health:
         return Health(
             verdict, reasons[0], 0, None, None, None, None, None, residuals.recoveries, [], [], []
         )
-    numbers = numbers_measured(rows)
-    within = rows["nis"] < WITHIN[numbers]
-    mean, spread = truncated_moments(numbers, WITHIN[numbers])
-    reach = 1.96 * spread / math.sqrt(max(int(within.sum()), 1))
+    inside = within(rows)
+    mean, spread = _expected(rows)
+    reach = 1.96 * spread / math.sqrt(max(int(inside.sum()), 1))
+    sources = np.unique(rows["source"][rows["source"] >= 0]).tolist()
     return Health(
         verdict=verdict,
         reason=reasons[0],
         measurements=count,
-        nis_mean=float(rows["nis"][within].mean()) if within.any() else None,
+        nis_mean=float(rows["nis"][inside].mean()) if inside.any() else None,
         nis_bounds_95=[mean - reach, mean + reach],
-        below_95=float((rows["nis"] < BELOW_95[numbers]).mean()),
-        beyond_share=1 - float(within.mean()),
+        below_95=float((rows["nis"] < _of_numbers(BELOW_95, numbers_of(rows))).mean()),
+        beyond_share=1 - float(inside.mean()),
         rejected_share=float((rows["outcome"] == tables.REJECTED).mean()),
         recoveries=residuals.recoveries,
         recovery_times_s=rows["time_s"][rows["recovered"] != 0][:20].tolist(),
-        sources=[_source(rows, within, source) for source in np.unique(rows["source"]).tolist()],
-        untrusted_s=_astray(rows["time_s"], within & ~_blind(rows)),
+        sources=[_source(rows, inside, source) for source in sources],
+        untrusted_s=_astray(rows["time_s"], inside & ~_blind(rows)),
     )
 
 
-def _source(rows: Columns, within: npt.NDArray[np.bool_], source: float) -> SourceHealth:
+def _source(rows: Columns, inside: npt.NDArray[np.bool_], source: float) -> SourceHealth:
     mine = rows["source"] == source
     plain = mine & (rows["near_field"] == 0)
     off, range_m = rows["innovation_0"][plain], rows["range_m"][plain]
     median = float(np.median(off)) if len(off) else math.nan
     spread = 1.4826 * float(np.median(np.abs(off - median))) if len(off) else math.nan
-    kept = within[plain]
+    kept = inside[plain]
     trend = math.nan
     if kept.sum() > 2 and np.ptp(range_m[kept]) > 0:
         trend = float(np.polyfit(range_m[kept], off[kept], 1)[0])
     return SourceHealth(
         source=int(source),
         measurements=int(mine.sum()),
-        beyond_share=1 - float(within[mine].mean()),
+        beyond_share=1 - float(inside[mine].mean()),
         median_m=median,
         spread_m=spread,
         trend=trend,
     )
 
 
-def _astray(time_s: npt.NDArray[Any], within: npt.NDArray[np.bool_]) -> list[tuple[float, float]]:
+def _astray(time_s: npt.NDArray[Any], inside: npt.NDArray[np.bool_]) -> list[tuple[float, float]]:
     """Give the times in which measurement after measurement is beyond three sigma."""
     order = np.argsort(time_s, kind="stable")
-    time, out = time_s[order], ~within[order]
+    time, out = time_s[order], ~inside[order]
     edges = np.flatnonzero(np.diff(np.concatenate([[False], out, [False]]).astype(int)))
     spans = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
     return [(float(time[a]), float(time[b - 1])) for a, b in spans if b - a >= ASTRAY]

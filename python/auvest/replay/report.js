@@ -29,7 +29,6 @@ const tracks = data.tracks.map((track) => ({
 const lines = data.lines.map((line) => ({ ...line, points: table(line.points) }));
 const leaders = data.leaders.map((leader) => ({ ...leader, points: table(leader.points) }));
 const REJECTED = data.outcomes.indexOf("rejected"), DOWN = data.outcomes.indexOf("downweighted");
-const HELD_OUT = data.outcomes.indexOf("held out");
 
 // The first of sorted times that is not before.
 function firstFrom(times, time) {
@@ -285,8 +284,10 @@ class Chart {
     for (const v of along.values) {
       const x = Math.round(this.x(v)) + 0.5;
       pen.beginPath(); pen.moveTo(x, this.top); pen.lineTo(x, this.bottom); pen.stroke();
-      pen.fillText(v.toFixed(along.digits), Math.min(x, this.right - 12), this.bottom + 5);
+      if (x < this.right - 26) pen.fillText(v.toFixed(along.digits), x, this.bottom + 5);
     }
+    pen.textAlign = "right";
+    pen.fillText("s", this.right, this.bottom + 5);
     if (this.low < 0 && this.high > 0) {
       pen.strokeStyle = "#9aa3ad";
       pen.beginPath(); pen.moveTo(this.left, this.y(0)); pen.lineTo(this.right, this.y(0)); pen.stroke();
@@ -726,25 +727,30 @@ function pick(table, rows, names) {
 
 const SOURCES_DRAWN = 8;
 function innovationCharts() {
-  const measured = tracks.filter((track) => track.measurements);
-  const counts = new Map();
-  for (const { measurements: m } of measured) for (const s of m.source) counts.set(s, (counts.get(s) ?? 0) + 1);
-  const order = [...counts].sort((p, q) => q[1] - p[1]).map(([source]) => source);
-  const own = order.slice(0, SOURCES_DRAWN).sort((p, q) => p - q);
-  const groups = own.map((s) => [`source ${s}`, `${s}`, (source) => source === s]);
-  if (order.length > own.length) groups.push(["all other sources", "others", (source) => !own.includes(source)]);
-  for (const [name, key, mine] of groups) data.measured.forEach(({ what, unit }, m) => {
-    const series = measured.flatMap((track) => {
-      const all = track.measurements, rows = [];
-      for (let k = 0; k < all.time_s.length; ++k) {
-        // Near the station the innovation is an error of the position and has no place among these.
-        if (mine(all.source[k]) && !all.near_field[k] && Number.isFinite(all[`innovation_${m}`][k])) rows.push(k);
-      }
-      const part = pick(all, rows, ["time_s", `innovation_${m}`, `sigma_${m}`, "outcome"]);
-      return rows.length ? [{ ...look(track), time: part.time_s, values: part[`innovation_${m}`], band: part[`sigma_${m}`], outcome: part.outcome }] : [];
+  for (const [number, sensor] of data.sensors.entries()) {
+    const measured = tracks.filter((track) => track.measurements?.sensor.includes(number));
+    if (!measured.length) continue;
+    const counts = new Map();
+    for (const { measurements: m } of measured) {
+      for (let k = 0; k < m.source.length; ++k) if (m.sensor[k] === number) counts.set(m.source[k], (counts.get(m.source[k]) ?? 0) + 1);
+    }
+    const order = [...counts].sort((p, q) => q[1] - p[1]).map(([source]) => source);
+    const own = order.slice(0, SOURCES_DRAWN).sort((p, q) => p - q);
+    const groups = own.map((s) => [sensor.sources ? `, source ${s}` : "", `${sensor.name}-${s}`, (source) => source === s]);
+    if (order.length > own.length) groups.push([", all other sources", `${sensor.name}-others`, (source) => !own.includes(source)]);
+    for (const [name, key, mine] of groups) sensor.measured.forEach(({ what, unit }, m) => {
+      const series = measured.flatMap((track) => {
+        const all = track.measurements, rows = [];
+        for (let k = 0; k < all.time_s.length; ++k) {
+          // Near the station the innovation is an error of the position and has no place among these.
+          if (all.sensor[k] === number && mine(all.source[k]) && !all.near_field[k] && Number.isFinite(all[`innovation_${m}`][k])) rows.push(k);
+        }
+        const part = pick(all, rows, ["time_s", `innovation_${m}`, `sigma_${m}`, "outcome"]);
+        return rows.length ? [{ ...look(track), time: part.time_s, values: part[`innovation_${m}`], band: part[`sigma_${m}`], outcome: part.outcome }] : [];
+      });
+      if (series.length) charts.push(new Chart({ id: `innovation-${key}-${m}`, title: `Innovation of ${what}${name} / ${unit}`, unit, points: true, series }));
     });
-    if (series.length) charts.push(new Chart({ id: `innovation-${m}-${key}`, title: `Innovation of ${what}, ${name} / ${unit}`, unit, points: true, series }));
-  });
+  }
 }
 
 function measurementCharts() {
@@ -758,7 +764,9 @@ function measurementCharts() {
     });
     if (series.length) charts.push(new Chart({ id, title, unit, points: true, series, ...more }));
   };
-  one("nis", `NIS before any weight, 95 % below ${data.nis_95.toFixed(2)}`, "", "nis", { least: 0, bound: data.nis_95 });
+  // Of measurements with different numbers the NIS is drawn over its own limit.
+  const title = data.nis_95 === null ? "NIS before any weight, over its own limit of 95 %" : `NIS before any weight, 95 % below ${data.nis_95.toFixed(2)}`;
+  one("nis", title, "", "nis_drawn", { least: 0, bound: data.nis_95 ?? 1 });
   one("weight", "Weight", "", "weight", { least: 0, most: 1 });
   one("interval", "Time since the measurement before / s", "s", "interval_s", { least: 0 });
   one("held-out", "Error of predicting held-out measurements / m", "m", "held_out_error_m");

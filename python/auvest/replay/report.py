@@ -122,6 +122,7 @@ def warnings(result: Result) -> list[str]:
         tables.BEFORE_START: "taken before the start of the run",
         tables.AFTER_END: "taken after the last line of the odometry",
         tables.NO_POSITION: "the position of the source is not known at that time",
+        tables.TOO_SHORT: "the range is shorter than the difference in depth",
     }
     for outcome, reason in reasons.items():
         count = result.numbers[outcome.replace(" ", "_")]

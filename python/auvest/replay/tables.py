@@ -14,11 +14,19 @@ Columns: TypeAlias = Mapping[str, npt.NDArray[Any]]
 
 ACCEPTED, DOWNWEIGHTED, REJECTED = "accepted", "downweighted", "rejected"
 HELD_OUT = "held out"
-BEFORE_START, AFTER_END, NO_POSITION = UNUSED = "before start", "after end", "no position"
+BEFORE_START, AFTER_END, NO_POSITION, TOO_SHORT = UNUSED = (
+    "before start",
+    "after end",
+    "no position",
+    "too short",
+)
 #: By the number of auvest.Decision.
 DECISIONS = np.array([ACCEPTED, DOWNWEIGHTED, REJECTED])
 #: What can become of a measurement, in the order of reports.
-OUTCOMES = (ACCEPTED, DOWNWEIGHTED, REJECTED, HELD_OUT, BEFORE_START, AFTER_END, NO_POSITION)
+OUTCOMES = (ACCEPTED, DOWNWEIGHTED, REJECTED, HELD_OUT, *UNUSED)
+#: What measured: a range, range and bearing (and elevation), a position, a velocity, a depth.
+SENSORS = ("range", "fix", "position", "velocity", "depth")
+RANGE, FIX, POSITION, VELOCITY, DEPTH = range(len(SENSORS))
 
 ESTIMATES = (
     "time_s", "x_m", "y_m", "heading_rad", "var_x_m2", "cov_xy_m2", "var_y_m2",
@@ -27,11 +35,14 @@ ESTIMATES = (
 #: Innovation and weight per number measured; near_field: the innovation is a position error.
 MEASUREMENTS = (
     "time_s", "source", "outcome", "innovation_0", "innovation_1", "sigma_0", "sigma_1",
-    "near_field", "nis", "weight_0", "weight_1", "recovered", "held_out_error_m",
+    "near_field", "nis", "weight_0", "weight_1", "recovered", "held_out_error_m", "sensor",
+    "innovation_2", "sigma_2", "weight_2",
 )  # fmt: skip
 #: What pages show of a measurement beside its table: the estimate at its time, where its source
 #: was, the range, and the time since the one before that was compared with a prediction.
 SHOWN = ("x_m", "y_m", "place_x_m", "place_y_m", "range_m", "interval_s")
+#: What is beside the estimates of a filter in space.
+SPATIAL = ("depth_m", "var_depth_m2")
 #: What is beside the estimates of a filter with several components, and by the number of
 #: auvest.Convergence.
 MIXTURE = ("convergence", "mixture_size")
@@ -92,6 +103,7 @@ def blank_measurements(rows: int) -> dict[str, npt.NDArray[Any]]:
     columns: dict[str, npt.NDArray[Any]] = {name: np.full(rows, np.nan) for name in MEASUREMENTS}
     columns["source"] = np.zeros(rows, np.int64)
     columns["outcome"] = np.full(rows, "", dtype="U12")
+    columns["sensor"] = np.full(rows, SENSORS[RANGE], dtype="U8")
     columns["near_field"] = np.zeros(rows, bool)
     columns["recovered"] = np.zeros(rows, bool)
     return columns

@@ -34,7 +34,7 @@ class Tally:
         self._held_square = 0.0
         self._nis = 0.0
         self._nis_count = 0
-        self._numbers = 1
+        self._numbers = 0
 
     def add(self, batch: Batch) -> None:
         """Take one batch."""
@@ -44,11 +44,13 @@ class Tally:
             self.outcomes[name] += count
         self.recovered += int(measured["recovered"].sum())
         self.near_field += int(measured["near_field"].sum())
-        nis = measured["nis"][~np.isnan(measured["nis"])]
+        compared = ~np.isnan(measured["nis"])
+        nis = measured["nis"][compared]
         self._nis += float(nis.sum())
         self._nis_count += len(nis)
-        if (~np.isnan(measured["innovation_1"])).any():
-            self._numbers = 2
+        self._numbers += len(nis)
+        for name in ("innovation_1", "innovation_2"):  # of those with more numbers than one
+            self._numbers += int((~np.isnan(measured[name][compared])).sum())
         held = measured["held_out_error_m"]
         held = held[~np.isnan(held)]
         self._held += len(held)
@@ -74,7 +76,10 @@ class Tally:
 
     def numbers(self) -> dict[str, Any]:
         """All figures by name; None where there is nothing to compute one from."""
-        bounds = chi2_bounds(self._numbers, self._nis_count) if self._nis_count else (None, None)
+        bounds: tuple[float | None, float | None] = (None, None)
+        if self._nis_count:
+            low, high = chi2_bounds(self._numbers, 1)
+            bounds = (low / self._nis_count, high / self._nis_count)
         return {
             "first_s": self.first_s,
             "last_s": self.last_s,

@@ -127,7 +127,7 @@ def _one_source(files: Files, _random: np.random.Generator) -> None:
 
 
 def _stray_file(folder: Path) -> None:
-    (folder / "depth.csv").write_text("time_s,depth_m\n0.0,12.5\n")
+    (folder / "battery.csv").write_text("time_s,voltage_v\n0.0,12.5\n")
 
 
 def _text(change: Callable[[str], str]) -> Callable[[Path], None]:
@@ -184,7 +184,7 @@ MISTAKES: Mapping[str, Mistake] = {
     "no echo 9999": Mistake("no_echo", "9999 where no echo came", ALL, _code(9999.0)),
     "no echo 400": Mistake("no_echo", "400, the end of the scale", ALL, _code(400.0)),
     "one source": Mistake("source_off", "ranges of one source 25 m too long", ALL, _one_source),
-    "depth.csv": Mistake(
+    "battery.csv": Mistake(
         "ignored_file", "a file that is not read", ALL, spoil_text=_stray_file
     ),
     "semicolons": Mistake(
