@@ -22,10 +22,13 @@ function point(x, y) {
 const hover = (x, y) => $("#map .over").dispatchEvent(new PointerEvent("pointermove", point(x, y)));
 const press = (what, key) => { $(what).focus(); document.activeElement.dispatchEvent(new KeyboardEvent("keydown", {key, bubbles: true})); };
 const slide = (time) => { $("#time").value = time; $("#time").dispatchEvent(new Event("input")); };
-function colour(x, y) {
+// The pixels of the map about a place.
+function colours(x, y) {
   const canvas = $("#map canvas"), box = canvas.getBoundingClientRect(), at = point(x, y);
-  const share = canvas.width / box.width;
-  return [...canvas.getContext("2d").getImageData(Math.round((at.clientX - box.left) * share), Math.round((at.clientY - box.top) * share), 1, 1).data];
+  const share = canvas.width / box.width, edge = 5;
+  const [left, top] = [at.clientX - box.left, at.clientY - box.top].map((v) => Math.round(v * share) - 2);
+  const all = [...canvas.getContext("2d").getImageData(left, top, edge, edge).data];
+  return Array.from({length: edge * edge}, (_, k) => all.slice(4 * k, 4 * k + 4));
 }
 addEventListener("load", async () => {
   const seen = {};

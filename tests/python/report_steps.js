@@ -3,7 +3,7 @@
 await step("opened", () => {});
 seen.order = [...document.querySelectorAll("input, button, [tabindex]")].map((e) => e.id || e.dataset.act || e.closest("figure")?.id || e.type);
 seen.nameless = [...document.querySelectorAll("input, button, canvas[tabindex]")].filter((e) => !(e.ariaLabel || e.textContent || e.labels?.[0]?.textContent)).length;
-seen.colour = colour(...PLACE);
+seen.colours = colours(...PLACE);
 await step("hovered", () => hover(10, 0));
 await step("left", () => hover(10, 200));
 await step("zoomed", () => $("[data-act=in]").click());

@@ -51,7 +51,6 @@ def document(results: Sequence[Result]) -> dict[str, Any]:
             for name in tables.SENSORS
         ],
         "nis_95": limit,
-        "untrusted": [list(seconds) for seconds in first.health.untrusted_s],
         "looks": {
             "beacon": {"colour": plots.BLACK},
             "leader": {"colour": plots.GREY, "dashes": [1, 3]},
@@ -80,6 +79,7 @@ def _tracks(result: Result, *, shares: bool) -> list[dict[str, Any]]:
             "estimates": _part(estimates, _ESTIMATES),
             "errors": _part(errors, _ERRORS) if len(errors["time_s"]) else None,
             "measurements": _measurements(result.measurements.columns(), shares=shares),
+            "untrusted": [list(seconds) for seconds in result.health.untrusted_s],
             "doubted": _measurements(result.outliers.columns(), shares=shares),
         }
     ]

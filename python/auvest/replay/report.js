@@ -22,8 +22,8 @@ function table(columns) {
   return columns && Object.fromEntries(Object.entries(columns).map(([name, c]) => [name, column(c)]));
 }
 
-const tracks = data.tracks.map((track) => ({
-  ...track, estimates: table(track.estimates), errors: table(track.errors),
+const tracks = data.tracks.map((track, place) => ({
+  ...track, place, estimates: table(track.estimates), errors: table(track.errors),
   measurements: table(track.measurements), doubted: table(track.doubted),
 }));
 const lines = data.lines.map((line) => ({ ...line, points: table(line.points) }));
@@ -61,6 +61,7 @@ const state = { from: data.from_s, to: data.to_s, cursor: data.from_s, hover: nu
 const span = Math.max(data.to_s - data.from_s, 1e-3);
 const layers = new Map();
 const shown = (name) => layers.get(name)?.checked ?? true;
+const drawn = () => tracks.filter((track) => shown(track.key));
 const charts = [];
 let waiting = null, dirty = false;
 
@@ -182,10 +183,18 @@ function mark(pen, kind, x, y, size = 4) {
   } else if (kind === "up" || kind === "down") {
     const s = kind === "up" ? -size : size;
     pen.moveTo(x - size, y - s / 2); pen.lineTo(x + size, y - s / 2); pen.lineTo(x, y + s); pen.closePath(); pen.fill();
+  } else if (kind === "square") {
+    pen.strokeRect(x - size / 2, y - size / 2, size, size);
+  } else if (kind === "diamond") {
+    pen.moveTo(x - size, y); pen.lineTo(x, y - size); pen.lineTo(x + size, y); pen.lineTo(x, y + size); pen.closePath(); pen.stroke();
+  } else if (kind === "plus") {
+    pen.moveTo(x - size, y); pen.lineTo(x + size, y); pen.moveTo(x, y - size); pen.lineTo(x, y + size); pen.stroke();
   } else {
     pen.arc(x, y, size / 2, 0, 2 * Math.PI); pen.fill();
   }
 }
+// What was accepted has a shape for each filter, so that colours are not all that tells them apart.
+const SHAPES = ["dot", "square", "diamond", "plus"];
 const OUTCOME_MARKS = { [REJECTED]: "cross", [DOWN]: "ring" };
 
 // ---- the plots over time ----
@@ -212,11 +221,13 @@ class Chart {
   y(value) { return this.bottom - (value - this.low) / (this.high - this.low) * (this.bottom - this.top); }
   time(x) { return state.from + (x - this.left) / (this.right - this.left) * (state.to - state.from); }
 
+  get visible() { return this.series.filter((one) => shown(one.key)); }
+
   // From the numbers in the window: gross errors are drawn at the edge and do not flatten the rest.
   extent() {
     let low = this.least ?? Infinity, high = this.most ?? -Infinity, reach = Infinity;
     const bands = [];
-    for (const one of this.series) {
+    for (const one of this.visible) {
       const a = firstFrom(one.time, state.from), b = firstFrom(one.time, state.to + 1e-9);
       const stride = Math.max(1, Math.floor((b - a) / 3000));
       for (let k = a; one.band && k < b; k += stride) if (Number.isFinite(one.band[k])) bands.push(SIGMAS * one.band[k]);
@@ -242,21 +253,15 @@ class Chart {
 
   draw() {
     const pen = this.canvas.begin(this.canvas.under), { width, height } = this.canvas;
-    this.left = 52; this.right = width - 10; this.top = 6; this.bottom = height - 20;
+    this.left = 52; this.right = width - 10; this.top = 6 + 3 * Math.max(0, tracks.length - 1); this.bottom = height - 20;
     this.extent();
-    pen.fillStyle = "#f4ecec";
-    for (const [from, to] of data.untrusted) {
-      if (to >= state.from && from <= state.to) {
-        const a = Math.max(this.x(from), this.left), b = Math.min(this.x(to), this.right);
-        pen.fillRect(a, this.top, Math.max(b - a, 1.5), this.bottom - this.top);
-      }
-    }
+    this.drawUntrusted(pen);
     this.drawAxes(pen);
     pen.save();
     pen.beginPath();
     pen.rect(this.left, this.top - 4, this.right - this.left, this.bottom - this.top + 8);
     pen.clip();
-    for (const one of this.series) {
+    for (const one of this.visible) {
       const a = Math.max(0, firstFrom(one.time, state.from) - 1);
       const b = Math.min(one.time.length, firstFrom(one.time, state.to) + 1);
       if (one.band) this.drawBand(pen, one, a, b);
@@ -270,9 +275,23 @@ class Chart {
     Object.assign(this.figure.dataset, { from: state.from, to: state.to, low: this.low, high: this.high });
   }
 
+  // Where a track is not to be trusted: grey, or with several a bar for each at the top.
+  drawUntrusted(pen) {
+    const judged = tracks.filter((track) => track.untrusted && shown(track.key));
+    judged.forEach((track, row) => {
+      pen.fillStyle = judged.length > 1 ? track.colour : "#e9e4dc";
+      for (const [from, to] of track.untrusted) {
+        if (to < state.from || from > state.to) continue;
+        const a = Math.max(this.x(from), this.left), width = Math.max(Math.min(this.x(to), this.right) - a, 1.5);
+        if (judged.length > 1) pen.fillRect(a, this.top - 6 + 4 * row, width, 3);
+        else pen.fillRect(a, this.top, width, this.bottom - this.top);
+      }
+    });
+  }
+
   drawAxes(pen) {
     pen.lineWidth = 1; pen.strokeStyle = FAINT; pen.fillStyle = SOFT;
-    const down = ticks(this.low, this.high, (this.bottom - this.top) / 32);
+    const down = ticks(this.low, this.high, (this.bottom - this.top) / 25);
     pen.textAlign = "right"; pen.textBaseline = "middle";
     for (const v of down.values) {
       const y = Math.round(this.y(v)) + 0.5;
@@ -334,7 +353,7 @@ class Chart {
       const x = this.x(one.time[k]);
       if (v > this.high) mark(pen, "up", x, this.top + 2);
       else if (v < this.low) mark(pen, "down", x, this.bottom - 2);
-      else mark(pen, OUTCOME_MARKS[one.outcome?.[k]] ?? "dot", x, this.y(v), OUTCOME_MARKS[one.outcome?.[k]] ? 3.5 : 3);
+      else mark(pen, OUTCOME_MARKS[one.outcome?.[k]] ?? SHAPES[one.place % SHAPES.length], x, this.y(v), OUTCOME_MARKS[one.outcome?.[k]] ? 3.5 : 3);
     }
   }
 
@@ -361,7 +380,7 @@ class Chart {
 
   // The number of each curve that is nearest in time.
   at(time) {
-    return this.series.flatMap((one) => {
+    return this.visible.flatMap((one) => {
       const k = nearest(one.time, time);
       return k < 0 || !Number.isFinite(one.values[k]) ? [] : [{ one, k }];
     });
@@ -489,8 +508,8 @@ class Plane {
     this.drawGrid(pen, width, height);
     for (const { points } of leaders) this.path(pen, points, data.looks.leader, 0.8, 0, points.time_s.length);
     for (const line of lines) if (shown(line.key)) this.windowed(pen, line.points, line);
-    for (const track of tracks) if (shown("doubted")) this.drawRanges(pen, track);
-    for (const track of tracks) {
+    for (const track of drawn()) if (shown("doubted")) this.drawRanges(pen, track);
+    for (const track of drawn()) {
       this.windowed(pen, track.estimates, track);
       if (shown("ellipses")) this.drawEllipses(pen, track);
     }
@@ -527,6 +546,7 @@ class Plane {
 
   drawScale(pen, height) {
     const length = this.step * this.scale;
+    pen.fillStyle = "#ffffffd0"; pen.fillRect(40, height - 52, length + 12, 26);
     pen.strokeStyle = INK; pen.fillStyle = INK; pen.lineWidth = 2;
     pen.beginPath(); pen.moveTo(46, height - 34); pen.lineTo(46, height - 30); pen.lineTo(46 + length, height - 30); pen.lineTo(46 + length, height - 34); pen.stroke();
     pen.textAlign = "center"; pen.textBaseline = "bottom";
@@ -611,7 +631,7 @@ class Plane {
       mark(pen, "up", this.px(points.x_m[k]), this.py(points.y_m[k]), 6);
       pen.fillStyle = INK; pen.fillText(`${source}`, this.px(points.x_m[k]) + 9, this.py(points.y_m[k]));
     }
-    for (const track of tracks) {
+    for (const track of drawn()) {
       const e = track.estimates;
       for (const [time, strong] of [[state.hover, false], [state.cursor, true]]) {
         const k = time === null ? -1 : nearest(e.time_s, time);
@@ -637,11 +657,11 @@ class Plane {
       const far = Math.hypot(px - x, py - y) * reach;
       if (far < least) { least = far; best = found; }
     };
-    for (const track of tracks) {
+    for (const track of drawn()) {
       const e = track.estimates, b = firstFrom(e.time_s, state.to + 1e-9);
       for (let k = firstFrom(e.time_s, state.from); k < b; ++k) consider(this.px(e.x_m[k]), this.py(e.y_m[k]), 1, { track, k });
     }
-    for (const track of tracks) {
+    for (const track of drawn()) {
       const d = track.doubted;
       if (!d || !shown("doubted")) continue;
       const b = firstFrom(d.time_s, state.to + 1e-9);
@@ -713,7 +733,7 @@ function errorCharts() {
   }
 }
 
-function look({ label, colour, dashes }) { return { label, colour, dashes }; }
+function look({ key, place, label, colour, dashes }) { return { key, place, label, colour, dashes }; }
 
 function sigmaChart() {
   charts.push(new Chart({ id: "sigma", title: "Sigma of the position, its longer axis / m", unit: "m", least: 0,
@@ -798,7 +818,7 @@ function legend() {
     item.append(label);
     byId("legend").append(item);
   };
-  for (const track of tracks) entry(track, track.label);
+  for (const track of tracks) entry(track, track.label, tracks.length > 1 ? track.key : null);
   for (const line of lines) entry(line, line.label, line.key);
   if (data.beacons.length) entry({ ...data.looks.beacon, shape: "up" }, "beacon, with its number");
   if (leaders.length) entry({ ...data.looks.leader, shape: "up" }, "leader, with its number");

@@ -37,7 +37,7 @@ def html(*results: Result) -> str:
         ),
         warnings="\n".join(
             f'<p class="warning">{escape(f"{title}: {text}" if title else text)}</p>'
-            for title, found in _by_filter(titles, [warnings(one) for one in results])
+            for title, found in by_filter(titles, [warnings(one) for one in results])
             for text in found
         ),
         numbers=columns_table(names, [rows(one) for one in results]),
@@ -65,7 +65,7 @@ def _listed(names: Sequence[str]) -> str:
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
-def _by_filter(titles: Sequence[str], found: Sequence[list[str]]) -> list[tuple[str, list[str]]]:
+def by_filter(titles: Sequence[str], found: Sequence[list[str]]) -> list[tuple[str, list[str]]]:
     """Put what is said of all filters first, once."""
     if len(found) == 1:
         return [("", found[0])]
