@@ -77,7 +77,7 @@ def main() -> None:
             assert drawn is not None
             print(
                 f"| {length:g} h | {result.numbers['estimates']:,} | "
-                f"{page.stat().st_size / 1e6:.1f} MB | {made:.1f} s | "
+                f"{page.stat().st_size / 1e6:.1f} MB | {made:.2f} s | "
                 f"{int(drawn[1]) / 1000:.2f} s | {whole:.1f} s |"
             )
 

@@ -70,7 +70,7 @@ def _tracks(result: Result, *, shares: bool) -> list[dict[str, Any]]:
     name = result.filter_name
     estimates, errors = result.estimates.columns(), result.errors.columns()
     title = filter_named(name).title
-    made = [
+    made: list[dict[str, Any]] = [
         {
             "key": name,
             "label": title,

@@ -494,9 +494,12 @@ class Plane {
     for (const { points } of leaders) add(points.x_m, points.y_m);
     add(data.beacons.map((b) => b.x_m), data.beacons.map((b) => b.y_m));
     if (!(right >= left)) [left, right, low, high] = [-1, 1, -1, 1];
-    this.x = 0.5 * (left + right); this.y = 0.5 * (low + high);
+    // Below it there is room for the scale and the numbers of the grid.
+    const above = 24, below = 60;
     this.scale = Math.min((this.canvas.width - 90) / Math.max(right - left, 1e-3),
-      (this.canvas.height - 70) / Math.max(high - low, 1e-3));
+      (this.canvas.height - above - below) / Math.max(high - low, 1e-3));
+    this.x = 0.5 * (left + right);
+    this.y = 0.5 * (low + high) - 0.5 * (below - above) / this.scale;
     this.fitted = true;
   }
   px(x) { return this.canvas.width / 2 + (x - this.x) * this.scale; }
