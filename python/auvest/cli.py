@@ -22,6 +22,7 @@ from auvest.commands.exit_codes import EXIT_CODES
 COMMANDS: Mapping[tuple[str, ...], str] = {
     ("capture",): "Record what a sketch reports: a CSV file, a figure, a table.",
     ("check",): "Check a log before it is used: what is there, and what may be wrong with it.",
+    ("compare",): "Replay a recorded run through several filters, side by side.",
     ("cost",): (
         "Measure a filter with your models on the simulated MEGA2560: flash, RAM, stack, cycles."
     ),
@@ -179,6 +180,8 @@ def _main(
       auvest check my_log                what is wrong with a recording, before it is used
 
       auvest replay --help               your own recordings through any filter
+
+      auvest compare --help              a recording through several filters, side by side
 
       auvest cost my_models.hpp          what your models take on the chip, and their bits there
 

@@ -34,8 +34,28 @@ ORANGE = "#E69F00"
 VERMILION = "#D55E00"
 GREY = "#777777"
 
-#: One colour per filter, the same in every figure.
-FILTER_COLOURS: Mapping[str, str] = {"ukf": VERMILION, "aukf": BLUE, "ekf": GREEN}
+PURPLE = "#A6488A"  # Okabe and Ito's, darker: thin lines on white
+BROWN = "#7A4B12"
+
+#: One colour per filter, the same in every figure and page.
+FILTER_COLOURS: Mapping[str, str] = {
+    "ekf": GREEN,
+    "ukf": VERMILION,
+    "ckf": SKY,
+    "aukf": BLUE,
+    "robust-ekf": PURPLE,
+    "robust-ukf": BROWN,
+}
+#: And one line style in pages, which tells them apart in greyscale: lengths of dashes and gaps in
+#: points; none for an unbroken line.
+FILTER_DASHES: Mapping[str, tuple[float, ...]] = {
+    "ekf": (7, 3),
+    "ukf": (3, 2),
+    "ckf": (9, 3, 2, 3),
+    "aukf": (5, 2, 1, 2, 1, 2),
+    "robust-ekf": (),
+    "robust-ukf": (12, 3),
+}
 _CYCLE = (BLUE, VERMILION, GREEN, ORANGE, SKY, GREY)
 
 

@@ -35,6 +35,7 @@ def samples(names: tuple[str, ...], rows: int, **columns: list[Any]) -> Samples:
     table |= {"time_s": np.arange(float(rows)), "near_field": np.zeros(rows, bool)}
     if "outcome" in names:
         table["outcome"] = np.full(rows, tables.ACCEPTED, "U12")
+        table["sensor"] = np.full(rows, "range")
     table |= {name: np.array(values) for name, values in columns.items()}
     made = Samples(names)
     made.add(table)
@@ -60,11 +61,11 @@ def curve(axes: Axes, label: str) -> tuple[list[float], list[float]]:
 def test_the_nis_is_drawn_with_its_one_sided_bound(result: Result) -> None:
     """95 % of a squared normal deviate are below 1.959964^2, of two below -2 ln 0.05."""
     ranges = measured(result, nis=[1.0, 2.0], innovation_0=[1.0, 1.0])
-    (axes,) = figures.nis(ranges).axes
+    axes = figures.overview(ranges).axes[2]
     assert curve(axes, "95 %")[1] == pytest.approx([1.959964**2] * 2, rel=1e-6)
     assert curve(axes, "NIS") == ([0.0, 1.0], [1.0, 2.0])
     fixes = measured(result, nis=[1.0, 2.0], innovation_1=[NAN, 0.1])
-    (axes,) = figures.nis(fixes).axes
+    axes = figures.overview(fixes).axes[2]
     assert curve(axes, "95 %")[1] == pytest.approx([-2 * math.log(0.05)] * 2, rel=1e-12)
 
 
@@ -73,7 +74,7 @@ def test_the_error_is_drawn_with_three_sigma(result: Result) -> None:
         tables.ERRORS, 2, error_x_m=[1.0, -1.0], error_y_m=[2.0, 3.0], sigma_x_m=[0.5, 1.0],
         sigma_y_m=[2.0, 4.0],
     )  # fmt: skip
-    x, y = figures.errors(replace(result, errors=errors)).axes
+    _, x, y = figures.overview(replace(result, errors=errors)).axes
     assert curve(x, "error")[1] == [1.0, -1.0]
     assert curve(y, "error")[1] == [2.0, 3.0]
     for axes, bound in ((x, 3.0), (y, 12.0)):
@@ -93,9 +94,8 @@ def test_innovations_near_the_station_are_not_drawn(result: Result) -> None:
         near_field=[False, True, False],
         outcome=[tables.ACCEPTED, tables.ACCEPTED, tables.REJECTED],
     )
-    along, across = figures.innovations(filled).axes
+    along = figures.overview(filled).axes[1]
     assert curve(along, "innovation") == ([0.0, 2.0], [0.5, -0.25])
-    assert curve(across, "innovation") == ([0.0, 2.0], [0.01, 0.02])
     assert curve(along, "rejected") == ([2.0], [-0.25])
     (band,) = along.collections
     assert band.get_datalim(along.transData).ymax == pytest.approx(6.0)
@@ -107,21 +107,8 @@ def test_gross_errors_do_not_flatten_the_rest(result: Result) -> None:
     columns = {"sigma_0": [1.0] * 4}
     near = measured(result, innovation_0=[0.1, 0.2, 0.3, 23.9], **columns)
     far = measured(result, innovation_0=[0.1, 0.2, 0.3, -24.1], **columns)
-    assert figures.innovations(near).axes[0].get_yscale() == "linear"
-    assert figures.innovations(far).axes[0].get_yscale() == "symlog"
-
-
-def test_weights_are_those_of_the_worse_number(result: Result) -> None:
-    filled = measured(
-        result,
-        weight_0=[1.0, 0.75, 0.5, 0.0],
-        weight_1=[1.0, 0.25, NAN, 0.0],
-        outcome=[tables.ACCEPTED, tables.DOWNWEIGHTED, tables.DOWNWEIGHTED, tables.REJECTED],
-    )
-    (axes,) = figures.weights(filled).axes
-    assert curve(axes, "downweighted") == ([1.0, 2.0], [0.25, 0.5])
-    assert curve(axes, "rejected") == ([3.0], [0.0])
-    assert curve(axes, "weight") == ([0.0, 1.0, 2.0, 3.0], [1.0, 0.75, 0.5, 0.0])
+    assert figures.overview(near).axes[1].get_yscale() == "linear"
+    assert figures.overview(far).axes[1].get_yscale() == "symlog"
 
 
 NUMBERS: dict[str, Any] = {
@@ -136,6 +123,7 @@ NUMBERS: dict[str, Any] = {
     "before_start": 5,
     "after_end": 6,
     "no_position": 7,
+    "too_short": 3,
     "recovered": 8,
     "near_field": 9,
     "rmse_m": 0.12345,
@@ -189,6 +177,7 @@ def test_what_was_not_used_in_words(result: Result) -> None:
         "Measurements: 5 not used, taken before the start of the run.",
         "Measurements: 6 not used, taken after the last line of the odometry.",
         "Measurements: 7 not used, the position of the source is not known at that time.",
+        "Measurements: 3 not used, the range is shorter than the difference in depth.",
     ]
     document = replace(result, numbers=NUMBERS, interrupted=True).document()
     assert document["interrupted"] is True

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -135,11 +136,18 @@ class Replay(ABC):
             if limit >= self.start[0] or last:
                 *inner, end = self._stretches(limit)
                 for stop in inner:
-                    yield self._advance(stop, last=False)
-                yield self._advance(end, last=last)
+                    yield self._with_places(self._advance(stop, last=False))
+                yield self._with_places(self._advance(end, last=last))
                 self._sources.forget(limit - self._late_s)
                 self.instruments.depths.forget(limit - self._late_s)
                 self.instruments.source_depths.forget(limit - self._late_s)
+
+    def _with_places(self, batch: Batch) -> Batch:
+        """Say where the sources of the measurements were, while that is known."""
+        measured = batch.measurements
+        places = self._sources.locate(measured["time_s"], measured["source"].astype(float))
+        places[~np.isin(measured["sensor"], ("range", "fix"))] = np.nan
+        return replace(batch, places=places[:, :2])
 
     @property
     def bytes_read(self) -> int:

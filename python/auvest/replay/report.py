@@ -1,47 +1,104 @@
-"""One HTML file with everything about a replay: no network, no script, pictures inside."""
+"""One HTML file with everything about a replay, or several of one log: a map and plots to explore.
+
+It needs no network: script and style are in it, and its own policy lets it load nothing and run
+nothing but that script.
+"""
 
 from __future__ import annotations
 
 import base64
-import io
+import hashlib
+import json
+from collections.abc import Sequence
 from html import escape
 from importlib import resources
 from typing import Any
 
-from matplotlib import rc_context
-
-from auvest.replay import tables
-from auvest.replay.figures import figures
+from auvest.registry import filter_named
+from auvest.replay import drawing, tables
 from auvest.replay.health import Health
 from auvest.replay.run import Result
 
 
-def html(result: Result) -> str:
-    """Make the page of a replay."""
-    pictures = "\n".join(
-        f'<h2>{escape(title)}</h2>\n<img alt="{escape(title)}" src="{_svg(figure)}">'
-        for title, figure in figures(result).items()
+def html(*results: Result) -> str:
+    """Make the page of a replay, or of several of one log, side by side."""
+    first = results[0]
+    names = [filter_named(one.filter_name).title for one in results]
+    alone = len(results) == 1
+    script = _text("report.js")
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    titles = [name if not alone else "" for name in names]
+    return _text("report.html").format(
+        title=escape(f"{first.name}: replay with {_listed([one.filter_name for one in results])}"),
+        digest=f"sha256-{digest}",
+        style=_text("report.css"),
+        verdicts="\n".join(
+            _verdict(one, title) for one, title in zip(results, titles, strict=True)
+        ),
+        warnings="\n".join(
+            f'<p class="warning">{escape(f"{title}: {text}" if title else text)}</p>'
+            for title, found in by_filter(titles, [warnings(one) for one in results])
+            for text in found
+        ),
+        numbers=columns_table(names, [rows(one) for one in results]),
+        health="\n".join(
+            (f"<h3>{escape(title)}</h3>\n" if title else "") + _health(one)
+            for one, title in zip(results, titles, strict=True)
+        ),
+        settings=f'<div id="settings">{_table(_settings(first))}</div>',
+        thinned=escape(thinned(results)),
+        # No end of the element that it is in can stand in it.
+        data=json.dumps(drawing.document(results), allow_nan=False).replace("<", "\\u003c"),
+        script=script,
     )
-    settings = [
+
+
+def thinned(results: Sequence[Result]) -> str:
+    """Say how much of the tables the plots show."""
+    kinds = ("estimates", "measurements", "errors")
+    strides = {kind: max(getattr(one, kind).stride for one in results) for kind in kinds}
+    parts = [f"one row in {stride} of {kind}" for kind, stride in strides.items() if stride > 1]
+    return f"Drawn: {_listed(parts)}; the tables have all." if parts else ""
+
+
+def _listed(names: Sequence[str]) -> str:
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+def by_filter(titles: Sequence[str], found: Sequence[list[str]]) -> list[tuple[str, list[str]]]:
+    """Put what is said of all filters first, once."""
+    if len(found) == 1:
+        return [("", found[0])]
+    common = [text for text in found[0] if all(text in other for other in found[1:])]
+    own = [[text for text in texts if text not in common] for texts in found]
+    return [("", common), *zip(titles, own, strict=True)]
+
+
+def _verdict(result: Result, title: str) -> str:
+    health = result.health
+    words = health.verdict.replace("_", " ")
+    who = f"{escape(title)}: " if title else ""
+    return (
+        f'<p>{who}<span class="verdict {health.verdict}">{escape(words)}</span>'
+        f"{escape(health.reason)}.</p>"
+    )
+
+
+def _health(result: Result) -> str:
+    lines = [
+        *sources(result.health),
+        ("not to be trusted", untrusted(result.health) or "nothing"),
+    ]
+    return f'<div class="scroll" id="sources">{_table(lines)}</div>'
+
+
+def _settings(result: Result) -> list[tuple[str, str]]:
+    return [
         (f"[{section}] {key}", str(value))
         for section, values in result.document()["settings"].items()
         for key, value in values.items()
         if value is not None
     ]
-    # The page's policy lets it load nothing but the pictures that are in it.
-    template = resources.files("auvest.replay").joinpath("report.html")
-    return template.read_text(encoding="utf-8").format(
-        title=escape(f"{result.name}: replay with {result.filter_name}"),
-        warnings="\n".join(f'<p class="warning">{escape(text)}</p>' for text in warnings(result)),
-        numbers=_table(rows(result)),
-        verdict=escape(result.health.verdict.replace("_", " ")),
-        reason=escape(result.health.reason),
-        health=_table(
-            [*sources(result.health), ("not to be trusted", untrusted(result.health) or "nothing")]
-        ),
-        pictures=pictures,
-        settings=_table(settings),
-    )
 
 
 def warnings(result: Result) -> list[str]:
@@ -163,6 +220,32 @@ def untrusted(health: Health) -> str:
     return ", ".join(spans) + more
 
 
+def columns_table(names: Sequence[str], columns: Sequence[list[tuple[str, str]]]) -> str:
+    """Write the figures of each filter in a column of its own."""
+    if len(names) == 1:
+        return f'<div class="scroll">{_table(columns[0])}</div>'
+    head = "".join(f"<td>{escape(name)}</td>" for name in names)
+    body = "\n".join(
+        f"<tr><th>{escape(name)}</th>"
+        + "".join(f'<td class="number">{escape(cell)}</td>' for cell in cells)
+        + "</tr>"
+        for name, *cells in side_by_side(columns)
+    )
+    return (
+        f'<div class="scroll"><table>\n<thead><tr><th></th>{head}</tr></thead>\n'
+        f"<tbody>\n{body}\n</tbody></table></div>"
+    )
+
+
+def side_by_side(columns: Sequence[list[tuple[str, str]]]) -> list[tuple[str, ...]]:
+    """Join figures by their names, in the order of the one that has most; "" where one has none."""
+    longest = max(columns, key=len)
+    names = [name for name, _ in longest]
+    names += [name for column in columns for name, _ in column if name not in names]
+    known = [dict(column) for column in columns]
+    return [(name, *(column.get(name, "") for column in known)) for name in dict.fromkeys(names)]
+
+
 def _table(lines: list[tuple[str, str]]) -> str:
     cells = (
         f'<tr><th>{escape(name)}</th><td class="number">{escape(text)}</td></tr>'
@@ -171,9 +254,5 @@ def _table(lines: list[tuple[str, str]]) -> str:
     return "<table>\n" + "\n".join(cells) + "\n</table>"
 
 
-def _svg(figure: Any) -> str:
-    buffer = io.StringIO()
-    with rc_context({"svg.hashsalt": "auvest"}):
-        figure.savefig(buffer, format="svg", metadata={"Date": None})
-    data = base64.b64encode(buffer.getvalue().encode()).decode()
-    return f"data:image/svg+xml;base64,{data}"
+def _text(name: str) -> str:
+    return resources.files("auvest.replay").joinpath(name).read_text(encoding="utf-8")

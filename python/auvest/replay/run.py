@@ -20,6 +20,7 @@ from auvest.replay.config import FilterName, Settings
 from auvest.replay.engine import Replay, replay_of
 from auvest.replay.health import Health, Residuals, health
 from auvest.replay.samples import Samples
+from auvest.replay.shown import Shown
 from auvest.replay.smoothing import Smoothing
 from auvest.replay.tally import Tally
 
@@ -43,10 +44,12 @@ class Result:
         ``settled_rmse_m``, from then on; of one that was smoothed ``smoothed``, with ``lag_s``,
         ``rmse_m``, ``max_error_m`` and ``inside_3_sigma`` of that track.
     estimates, measurements, errors, outliers : Samples
-        At most a few thousand rows of each table, for figures; ``outliers`` are measurements with
-        less than full weight.
+        At most some ten thousand rows of each table, for figures; ``outliers`` are measurements
+        with less than full weight. Measurements have the columns ``tables.SHOWN``, too.
     sources : ndarray, shape (K, 2)
         Positions of the beacons, m.
+    source_numbers : tuple of int
+        Their numbers in the log.
     health : Health
         Whether it is to be trusted, and why.
     findings : list of Finding
@@ -64,6 +67,7 @@ class Result:
     errors: Samples
     outliers: Samples
     sources: np.ndarray[Any, np.dtype[np.float64]]
+    source_numbers: tuple[int, ...]
     health: Health
     findings: list[Finding]
     interrupted: bool
@@ -138,7 +142,8 @@ def replay(
     found: list[Finding] = []
     estimates = Samples(tables.ESTIMATES + (tables.SMOOTHED if smooth else ()))
     errors = Samples(tables.ERRORS + (tables.SMOOTHED_ERRORS if smooth else ()))
-    measurements, outliers = Samples(tables.MEASUREMENTS), Samples(tables.MEASUREMENTS)
+    columns = tables.MEASUREMENTS + tables.SHOWN
+    measurements, outliers, shown = Samples(columns), Samples(columns), Shown()
     interrupted = False
     with ExitStack() as stack:
         files = _open(folder, stack, smooth=smooth)
@@ -157,8 +162,9 @@ def replay(
                         write(batch)
                     estimates.add(batch.estimates)
                     errors.add(batch.errors)
-                    measurements.add(batch.measurements)
-                    outliers.add(_outliers(batch.measurements))
+                    measured = shown.of(batch)
+                    measurements.add(measured)
+                    outliers.add(_outliers(measured))
                 if progress is not None:
                     progress(engine.bytes_read, engine.bytes)
 
@@ -195,6 +201,7 @@ def replay(
         errors=errors,
         outliers=outliers,
         sources=np.array(list(log.beacons().values())).reshape(-1, 2),
+        source_numbers=tuple(log.beacons()),
         health=health(residuals, found),
         findings=found,
         interrupted=interrupted,

@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 from auvest.replay.tables import Columns
 
-#: Points of one curve that a reader can still tell apart.
-LIMIT = 4000
+#: Points of one curve that a reader who zooms in can still tell apart, in a page of some megabytes.
+LIMIT = 10_000
 
 
 class Samples:
@@ -44,6 +44,11 @@ class Samples:
             merged = {name: values[::2].copy() for name, values in self.columns().items()}
             self._parts = [merged]
             self._kept = len(merged["time_s"])
+
+    @property
+    def stride(self) -> int:
+        """Which rows were kept: every so-many-th."""
+        return self._stride
 
     def columns(self) -> dict[str, npt.NDArray[Any]]:
         """Give what was kept."""

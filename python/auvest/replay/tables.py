@@ -39,6 +39,9 @@ MEASUREMENTS = (
     "near_field", "nis", "weight_0", "weight_1", "recovered", "held_out_error_m", "sensor",
     "innovation_2", "sigma_2", "weight_2",
 )  # fmt: skip
+#: What pages show of a measurement beside its table: the estimate at its time, where its source
+#: was, the range, and the time since the one before that was compared with a prediction.
+SHOWN = ("x_m", "y_m", "place_x_m", "place_y_m", "range_m", "interval_s")
 #: What is beside the estimates of a filter in space.
 SPATIAL = ("depth_m", "var_depth_m2")
 #: What is beside the estimates of a filter with several components, and by the number of
@@ -63,6 +66,7 @@ class Batch:
 
     ``ranges_m`` are the ranges of the measurements as the log has them, ``located`` says of those
     that were used as ranges whether the belief behind each told where on its circle the craft is.
+    ``places`` are x and y of the sources of the measurements, NaN where not known.
     ``track`` is what :mod:`auvest.replay.smoothing` needs of it.
     """
 
@@ -71,6 +75,7 @@ class Batch:
     errors: Columns
     ranges_m: npt.NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
     located: npt.NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, bool))
+    places: npt.NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
     track: Any = None
 
 
@@ -85,7 +90,12 @@ def moved(batch: Batch, origin: tuple[float, float]) -> Batch:
             for name, values in table.items()
         }
 
-    return replace(batch, estimates=shift(batch.estimates), errors=shift(batch.errors))
+    return replace(
+        batch,
+        estimates=shift(batch.estimates),
+        errors=shift(batch.errors),
+        places=batch.places + origin,
+    )
 
 
 def pose(
