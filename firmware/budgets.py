@@ -434,27 +434,26 @@ def measure_elsewhere(output: Path, wanted: Iterable[tuple[str, str]] | None = N
     """
     if wanted is None:
         wanted = [(name, program) for name in TARGETS if name != TARGET for program in FILTERS]
-    rows = []
+    wanted, rows = list(wanted), []
+    library = package(output) if any(name == SMALL_AVR for name, _ in wanted) else None
     for target, program in wanted:
         folder = output / target / program
         folder.mkdir(parents=True, exist_ok=True)
-        row = (
-            _measure_small_avr(program, folder, output)
-            if target == SMALL_AVR
-            else _measure_chip(CHIPS[target], program, folder)
-        )
+        if target == SMALL_AVR:
+            assert library is not None
+            row = _measure_small_avr(program, folder, library, output / f"compiled-{SMALL_AVR}")
+        else:
+            row = _measure_chip(CHIPS[target], program, folder)
         if row is not None:
             rows.append(row)
     return rows
 
 
-def _measure_small_avr(program: str, folder: Path, output: Path) -> Row | None:
+def _measure_small_avr(program: str, folder: Path, library: Path, output: Path) -> Row | None:
     (folder / f"{program}.ino").write_text(_source(program), encoding="utf-8")
     shutil.copy(ROOT / "firmware" / "board" / "board.hpp", folder)
     try:
-        compiled = compile_sketch(
-            folder, package(output), output / f"compiled-{SMALL_AVR}", board=AVR_BOARDS[SMALL_AVR]
-        )
+        compiled = compile_sketch(folder, library, output, board=AVR_BOARDS[SMALL_AVR])
     except SketchError as error:
         if re.search(r"will not fit in region|is not within region", str(error)):
             return None
