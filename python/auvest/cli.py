@@ -29,6 +29,7 @@ COMMANDS: Mapping[tuple[str, ...], str] = {
     ("filters",): "List the filters: what each takes, and where it runs with the same bits.",
     ("hil",): "Play a log to the filter on a chip, and compare every bit with the desk.",
     ("import",): "Turn a recording into a log for 'auvest replay', or list what it holds.",
+    ("init",): "Write a first settings file for a folder of recordings.",
     ("library",): "Write the Arduino library: a zip for the IDE or PlatformIO.",
     ("mission",): "Play the vehicle that the sketch mission steers, on a board or simulated.",
     ("replay",): "Replay recorded runs through a filter.",
@@ -171,6 +172,8 @@ def _main(
       auvest reproduce logs              real recordings: our filters beside the baselines
 
       auvest reproduce mrclam6           real robots: SLATF and EKF-SLAT with an IMM master
+
+      auvest init my_log                 a first settings file: which of your files is what
 
       auvest check my_log                what is wrong with a recording, before it is used
 

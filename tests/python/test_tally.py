@@ -117,7 +117,7 @@ def test_what_became_of_the_measurements() -> None:
     counts = {name: numbers[name.replace(" ", "_")] for name in tables.OUTCOMES}
     assert counts == {
         "accepted": 1, "downweighted": 0, "rejected": 1, "held out": 3,
-        "before start": 1, "after end": 0, "no position": 0,
+        "before start": 1, "after end": 0, "no position": 0, "too short": 0,
     }  # fmt: skip
     assert numbers["measurements"] == 6
     assert (numbers["recovered"], numbers["near_field"]) == (1, 1)

@@ -23,7 +23,7 @@ from rich.table import Table
 from auvest.commands import log_options, options
 from auvest.commands.console import Terminal, table
 from auvest.commands.version import version
-from auvest.logs.check import FileSeen
+from auvest.logs.check import FileSeen, SourceSeen
 from auvest.logs.findings import worst
 from auvest.replay.checks import Checked, check
 
@@ -32,13 +32,14 @@ def command(
     logs: log_options.Logs,
     filter_name: log_options.Filter = None,
     config: log_options.Config = None,
+    changes: log_options.Set = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
     """Check; the help text is the module's."""
     terminal = Terminal(as_json=as_json, quiet=quiet)
     with terminal.usage_errors():
-        settings = log_options.settings_of(config)
+        settings = log_options.settings_of(config, changes)
         for path in logs:
             if not path.is_dir():
                 raise ValueError(f"LOG: {path} is not a folder (docs/logs.md)")
@@ -61,7 +62,7 @@ def command(
 def _show(terminal: Terminal, one: Checked) -> None:
     if one.files:
         terminal.result(_files(one))
-    if one.health is not None and one.health.measurements:
+    if one.health is not None and one.health.sources:
         terminal.result(_sources(one))
     for found in one.findings:
         terminal.result(f"{found.verdict.replace('_', ' '):11} {found.cause}: {found.text}")
@@ -91,7 +92,9 @@ def _longest(seen: FileSeen) -> str:
 
 def _sources(one: Checked) -> Table:
     assert one.health is not None
-    seen = (one.files.get("ranges.csv") or one.files["fixes.csv"]).sources
+    seen: dict[int, SourceSeen] = {}
+    for name in ("fixes.csv", "ranges.csv"):
+        seen |= one.files[name].sources if name in one.files else {}
     rows = [
         (
             f"{source.source}",

@@ -88,7 +88,7 @@ def command(
             )
     with terminal.usage_errors():
         settings = log_options.settings_of(config)
-        folder = LogFolder(log)
+        folder = LogFolder(log, reading=settings.reading)
         name = checks.filter_of(folder, settings, filter_name)
         try:
             record = record_of(folder, settings, name, rows=rows)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from auvest.replay import Settings, find_settings
-from auvest.replay.config import FilterName, packaged_settings
+from auvest.replay.config import FilterName, KernelName, packaged_settings
 
 Logs = Annotated[
     list[Path], typer.Argument(metavar="LOG...", help="Folders of logs.", show_default=False)
@@ -32,6 +33,26 @@ Config = Annotated[
 ]
 
 
-def settings_of(config: str | None) -> Settings:
-    """Read the settings that --config names; without it, the defaults."""
-    return Settings() if config is None else find_settings(config)
+Set = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        help="One setting over those of --config, as ranges.sigma_m=1.5; again for more.",
+        metavar="SECTION.KEY=VALUE",
+        show_default=False,
+    ),
+]
+KernelOption = Annotated[
+    KernelName | None,
+    typer.Option(
+        "--kernel", help="The robust kernel.", show_default="that of the settings, else hampel"
+    ),
+]
+
+
+def settings_of(
+    config: str | None, changes: Sequence[str] | None = None, kernel: KernelName | None = None
+) -> Settings:
+    """Read the settings that --config names, else the defaults, with --set and --kernel."""
+    own = [f"filter.kernel={kernel}"] if kernel is not None else []
+    return find_settings(config or "", [*(changes or ()), *own])

@@ -13,6 +13,8 @@ Examples
 
   auvest replay logs/goats14 --config goats14
 
+  auvest replay logs/goats14 --config goats14 --kernel huber --set ranges.sigma_m=2.5
+
   auvest replay logs/robot* --filter ekf --json --quiet | jq '.logs[].rmse_m'
 """
 
@@ -37,6 +39,8 @@ def command(
     logs: log_options.Logs,
     filter_name: log_options.Filter = None,
     config: log_options.Config = None,
+    changes: log_options.Set = None,
+    kernel: log_options.KernelOption = None,
     output: options.Output = Path("auvest-output/replay"),
     force: options.Force = False,
     as_json: options.Json = False,
@@ -45,8 +49,8 @@ def command(
     """Replay; the help text is the module's."""
     terminal = Terminal(as_json=as_json, quiet=quiet)
     with terminal.usage_errors():
-        settings = log_options.settings_of(config)
-        folders = [LogFolder(path) for path in logs]
+        settings = log_options.settings_of(config, changes, kernel)
+        folders = [LogFolder(path, reading=settings.reading) for path in logs]
         names = [folder.path.resolve().name for folder in folders]
         for name in names:
             if names.count(name) > 1:

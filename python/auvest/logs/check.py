@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -354,7 +354,8 @@ def survey(log: LogFolder, limits: Limits) -> Survey:
         files[name] = FileSeen(table, limits.reorder_s)
         for rows, first in table.chunks():
             files[name].add(rows, first)
-    found = [*ignored_files(log.path, log), *_ignored_columns(log)]
+    read = {table.path.name for table in log.tables.values()}
+    found = [*ignored_files(log.path, read), *_ignored_columns(log)]
     units = list(_units(files, limits))
     found += units
     found += _clocks(files)
@@ -377,19 +378,22 @@ def from_error(error: LogError) -> Finding:
 def _ignored_columns(log: LogFolder) -> Iterator[Finding]:
     """Name the columns that are of no use."""
     for table in log.tables.values():
-        unused = table.ignored
+        others = [one for one in log.tables.values() if one.path == table.path]
+        unused = [name for name in table.ignored if all(name in one.ignored for one in others)]
+        if table is not others[0]:  # said already
+            continue
+        turned: list[str] = []
         if table.name == "odometry.csv" and "compass.csv" in log:
-            turns = {"turn_rad", "yaw_rate_rad_s", "heading_rad"} & set(table.names)
-            unused = [*unused, *sorted(turns)]
+            turned = sorted({"turn_rad", "yaw_rate_rad_s", "heading_rad"} & set(table.names))
+            unused = [*unused, *turned]
         if unused:
-            more = "; compass.csv says how the craft turns" if unused != table.ignored else ""
+            more = "; compass.csv says how the craft turns" if turned else ""
             message = f"not read: {', '.join(unused)}{more}"
             yield finding("ignored_column", message, file=table.path.name, line=1)
 
 
-def ignored_files(folder: Path, log: LogFolder | None = None) -> Iterator[Finding]:
-    """Name the tables in a log's folder that no log has."""
-    read = set() if log is None else {table.path.name for table in log.tables.values()}
+def ignored_files(folder: Path, read: Collection[str] = ()) -> Iterator[Finding]:
+    """Name the tables in a log's folder that no log has, beside those that are read."""
     for path in sorted(folder.iterdir()):
         table = path.suffix.lower() in (".csv", ".tsv", ".txt", ".dat")
         if path.name in read:

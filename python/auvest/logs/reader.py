@@ -401,6 +401,9 @@ class CsvTable:
             value = float(values[i])
             hint = f" ({column.suspicion})" if column.suspicion and math.isfinite(value) else ""
             missing = "; leave out the row where there is no measurement" if value != value else ""
+            if self._given[k] in self._reading.units:
+                unit = self._reading.units[self._given[k]]
+                missing += f"; {self._reading.where} takes the file's numbers in {unit!r}"
             raise LogError(
                 self.path,
                 f"{value:.10g} is not {column.expected}{hint}{missing}",

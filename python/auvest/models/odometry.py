@@ -26,7 +26,9 @@ class Odometry(ProcessModel):
     sigma_drift : float
         Noise of the position that goes with time, m/sqrt(s), not negative.
     sigma_turn : float
-        Noise of the heading, rad/sqrt(s), not negative.
+        Noise of the heading that goes with time, rad/sqrt(s), not negative.
+    sigma_turned : float
+        Noise of the heading relative to the turn of an increment, not negative.
 
     Raises
     ------
@@ -40,3 +42,4 @@ class Odometry(ProcessModel):
     sigma_distance: float = not_negative(_DEFAULTS["sigma_distance"])
     sigma_drift: float = not_negative(_DEFAULTS["sigma_drift"])
     sigma_turn: float = not_negative(_DEFAULTS["sigma_turn"])
+    sigma_turned: float = not_negative(_DEFAULTS["sigma_turned"])

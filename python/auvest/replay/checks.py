@@ -135,7 +135,7 @@ def check(path: Path, settings: Settings, filter_name: FilterName | None = None)
     seen: dict[str, FileSeen] = {}
     left: Residuals | None = None
     try:
-        log = LogFolder(path, truth=False)
+        log = LogFolder(path, truth=False, reading=settings.reading)
         shown = survey(log, limits(settings))
         found += [*shown.findings, *_idle(log, settings)]
         seen = shown.files
@@ -148,7 +148,7 @@ def check(path: Path, settings: Settings, filter_name: FilterName | None = None)
         found.append(finding("innovations", message, verdict="not_trusted"))
     except LogError as error:
         if path.is_dir() and not seen:
-            found += ignored_files(path)
+            found += ignored_files(path, [one.file for one in settings.files.values()])
         found.append(from_error(error))
     found.sort(key=lambda one: -VERDICTS.index(one.verdict))
     verdict = worst(one.verdict for one in found)

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import math
 import sys
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Literal, TypeAlias, get_args, get_type_hints
 
-from auvest._fields import integer, not_negative, number, positive
+from auvest import _core
+from auvest._fields import flag, integer, not_negative, number, positive
 from auvest._outputs import is_plain_file
+from auvest.kernels import KERNELS, Kernel, RejectionStreak
+from auvest.logs.layout import COLUMNS, FILES
+from auvest.logs.reading import SEPARATORS, UNITS, Axes, FileReading, Reading, columns_of
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -18,25 +23,53 @@ else:
 
 FilterName: TypeAlias = Literal["ekf", "ukf", "ckf", "aukf", "robust-ekf", "robust-ukf"]
 KernelName: TypeAlias = Literal["huber", "hampel", "igg"]
+ResidualName: TypeAlias = Literal["innovation", "post-fit"]
+DiscretisationName: TypeAlias = Literal["exact", "euler"]
+DTypeName: TypeAlias = Literal["float64", "float32"]
 PolicyName: TypeAlias = Literal["fixed", "covariance-budget", "mahalanobis"]
 
 _PACKAGED = Path(__file__).parent / "configs"
+_KERNELS = _core.kernel_defaults()
+_ROBUST = _core.robust_update_defaults()
+_POINTS = _core.sigma_points_defaults()
 
 
 @dataclass(frozen=True, kw_only=True)
 class FilterSettings:
-    """The filter: ``kernel``, ``rejections`` and ``residual`` are those of robust-ekf.
+    """The filter.
 
+    ``kernel``, ``recovery``, ``rejections``, ``residual``, ``max_iterations`` and ``tolerance`` are
+    those of the robust ones, ``alpha``, ``beta`` and ``kappa`` of those with sigma points.
     ``components`` above 1 are for ranges from a start that is not known, ``headings`` above 1 for
     one whose heading is not known either.
     """
 
-    kind: FilterName | None = None  # None: robust-ekf for ranges, ukf for fixes
-    kernel: KernelName = "hampel"  # with the thresholds that are its defaults
-    alpha: float = positive(1e-3)
-    longest_step_s: float = positive(3600.0, infinite=True)
+    kind: FilterName | None = None  # default: robust-ekf with odometry, ukf without
+    kernel: KernelName = "hampel"  # its thresholds are in [kernel]
+    recovery: bool = flag(True)  # from lock-out
+    rejections: int = integer(_ROBUST["rejections"], 1, 60)  # in a row, until it acts
+    residual: ResidualName = "innovation"  # what the kernel judges
+    max_iterations: int = integer(_ROBUST["max_iterations"], 2, 255)  # of post-fit
+    tolerance: float = not_negative(_ROBUST["tolerance"])  # of post-fit
+    alpha: float = positive(1e-3)  # spread of the sigma points
+    beta: float = number(_POINTS["beta"])
+    kappa: float | None = number(None)  # default: 3 minus the number of states
+    dtype: DTypeName = "float64"  # float32: the bits of the filter on the vehicle
+    longest_step_s: float = positive(3600.0, infinite=True)  # a longer gap is refused
     components: int = integer(1, 1, 255)  # 16 to 32 for a start that is not known
     headings: int = integer(1, 1, 31)  # so many start headings, of 8 components each at least
+
+
+@dataclass(frozen=True, kw_only=True)
+class KernelSettings:
+    """Thresholds of the kernels in sigma; those of the one that is chosen count."""
+
+    a: float = positive(_KERNELS["hampel"]["a"], infinite=True)  # hampel: full weight below
+    b: float = positive(_KERNELS["hampel"]["b"], infinite=True)  # hampel: falls from here
+    c: float = positive(_KERNELS["hampel"]["c"], infinite=True)  # hampel: rejected from here
+    k: float = positive(_KERNELS["huber"]["k"], infinite=True)  # huber
+    k0: float = positive(_KERNELS["igg"]["k0"], infinite=True)  # igg: full weight below
+    k1: float = positive(_KERNELS["igg"]["k1"], infinite=True)  # igg: rejected from here
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,6 +89,7 @@ class OdometrySettings:
     sigma_distance: float = not_negative(0.05)  # of the distance of one increment
     sigma_drift: float = not_negative(0.1)  # m/sqrt(s)
     sigma_turn: float = not_negative(0.001)  # rad/sqrt(s)
+    sigma_turned: float = not_negative(0.0)  # of the turn of one increment
     speed_factor: float = positive(1.0)
     turn_factor: float = positive(1.0)
     turn_offset_rad_s: float = number(0.0)
@@ -85,8 +119,10 @@ class RangeSettings:
     """Ranges: noise, the least time between two of one source that are used, latency."""
 
     sigma_m: float = positive(1.0)
-    every_s: float = not_negative(0.0)
+    every_s: float = not_negative(0.0)  # least time between two of one source
     latency_s: float = not_negative(0.0)  # a line stands when its range came in, so long after
+    smallest_m: float = number(0.0)  # what the instrument can measure
+    largest_m: float = positive(math.inf, infinite=True)
     sources: Mapping[int, RangeSource] = field(default_factory=dict)
 
 
@@ -107,7 +143,9 @@ class FixSettings:
     sigma_range_m: float = positive(0.1)
     sigma_bearing_rad: float = positive(0.02)
     sigma_elevation_rad: float = positive(0.02)
-    near_field: float = not_negative(5.0)
+    near_field: float = not_negative(5.0)  # sigma of the position: nearer is a position
+    smallest_m: float = number(0.0)
+    largest_m: float = positive(math.inf, infinite=True)
     every_s: float = not_negative(0.0)
     latency_s: float = not_negative(0.0)
     sources: Mapping[int, FixSource] = field(default_factory=dict)
@@ -151,7 +189,8 @@ class ProcessSettings:
     position_psd: float = not_negative(0.0)
     velocity_psd: float = not_negative(1e-2)
     acceleration_psd: float = not_negative(1e-6)
-    vertical_velocity_psd: float = not_negative(1e-3)
+    vertical_velocity_psd: float = not_negative(1e-3)  # in space
+    discretisation: DiscretisationName = "exact"  # euler: as the AUKF paper prints it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -163,21 +202,34 @@ class IntervalSettings:
     min_s: float = positive(0.5)
     max_s: float = positive(10.0)
     position_sigma_m: float = positive(0.5)  # of covariance-budget
+    initial_s: float | None = positive(None)  # default: min_s
+    tau0: float | None = positive(
+        None
+    )  # this and what follows: mahalanobis, by default the paper's
+    scale: float | None = positive(None)
+    epsilon: float | None = positive(None)
+    gamma1_m2: float | None = positive(None)
+    gamma2: float | None = positive(None)
+    ratio_max: float | None = positive(None)
+    tau_min: float | None = positive(None)
+    tau_max: float | None = positive(None)
 
 
 @dataclass(frozen=True, kw_only=True)
 class LogSettings:
-    """Window for late lines, and the longest gap in a leader's track that a line bridges."""
+    """Axes, window for late lines, longest gap in a leader's track that a line bridges."""
 
+    frame: Axes = "enu"  # x east, y north; ned: x north, y east
     reorder_s: float = not_negative(0.0)
     leader_gap_s: float = not_negative(1.0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """All sections."""
+    """All sections; ``files`` is what [columns] and [units] say, by the names of a log's files."""
 
     filter: FilterSettings = FilterSettings()
+    kernel: KernelSettings = KernelSettings()
     start: StartSettings = StartSettings()
     odometry: OdometrySettings = OdometrySettings()
     compass: CompassSettings = CompassSettings()
@@ -189,6 +241,34 @@ class Settings:
     process: ProcessSettings = ProcessSettings()
     interval: IntervalSettings = IntervalSettings()
     log: LogSettings = LogSettings()
+    files: Mapping[str, FileReading] = field(default_factory=dict)
+
+    @property
+    def reading(self) -> Reading:
+        """How a log is read with them."""
+        return Reading(frame=self.log.frame, files=self.files)
+
+    @property
+    def robust(self) -> tuple[Kernel, RejectionStreak | None]:
+        """Kernel and recovery of a robust filter.
+
+        Raises
+        ------
+        ValueError
+            If the thresholds do not fit together.
+        """
+        kind = KERNELS[self.filter.kernel]
+        own = {entry.name: getattr(self.kernel, entry.name) for entry in fields(kind)}
+        streak = RejectionStreak(rejections=self.filter.rejections)
+        return kind(**own), streak if self.filter.recovery else None
+
+
+#: What [columns.FILE] says beside columns, and the values that it may have.
+FILE_KEYS: Mapping[str, tuple[str, ...]] = {
+    "file": (),
+    "separator": SEPARATORS,
+    "decimal": (".", ","),
+}
 
 
 def packaged_settings() -> tuple[str, ...]:
@@ -196,21 +276,30 @@ def packaged_settings() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in _PACKAGED.glob("*.toml")))
 
 
-def find_settings(name: str) -> Settings:
+def find_settings(name: str, changes: Sequence[str] = ()) -> Settings:
     """Read settings from a file, or those that come with the package, by name.
+
+    Parameters
+    ----------
+    name : str
+        The file, or one of :func:`packaged_settings`; "" for the defaults.
+    changes : sequence of str
+        ``section.key=value``, over what the file says.
 
     Raises
     ------
     ValueError
         As :func:`read_settings`.
     """
+    if not name:
+        return _changed({}, changes, "settings")
     path = Path(name)
     if not path.exists():
         if name not in packaged_settings():
             known = ", ".join(packaged_settings())
             raise ValueError(f"{name}: there is no such file; the package's settings are {known}")
         path = _PACKAGED / f"{name}.toml"
-    return read_settings(path)
+    return _changed(_document(path), changes, str(path))
 
 
 def read_settings(path: Path) -> Settings:
@@ -222,17 +311,41 @@ def read_settings(path: Path) -> Settings:
         If the file cannot be read, is not TOML, or says something that is not known or out of
         range; the message names file, section and key.
     """
+    return settings_from(_document(path), str(path))
+
+
+def _document(path: Path) -> dict[str, Any]:
     try:
         if path.exists() and not is_plain_file(path):
             raise ValueError(f"{path}: is not a file")
-        document = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise ValueError(f"{path}: cannot be read: {error.strerror or error}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ValueError(f"{path}: is not TOML: {error}") from None
     except RecursionError:
         raise ValueError(f"{path}: is not TOML: brackets in brackets without end") from None
-    return settings_from(document, str(path))
+
+
+def _changed(document: dict[str, Any], changes: Sequence[str], source: str) -> Settings:
+    """Build settings from a document with ``section.key=value`` over it."""
+    for change in changes:
+        path, equals, text = change.partition("=")
+        *sections, key = path.strip().split(".")
+        if not equals or not sections:
+            raise ValueError(f"--set: {change!r} is not SECTION.KEY=VALUE")
+        try:
+            value = tomllib.loads(f"value = {text}")["value"]
+        except tomllib.TOMLDecodeError:
+            value = text.strip()  # a word without quotes
+        at = document
+        for section in sections:
+            at = at.setdefault(section, {})
+            if not isinstance(at, dict):
+                raise ValueError(f"--set: {path.strip()}: {section} is no section")
+        at[key] = value
+        source = f"{source} with --set" if not source.endswith("--set") else source
+    return settings_from(document, source)
 
 
 def settings_from(document: dict[str, Any], source: str = "settings") -> Settings:
@@ -244,14 +357,61 @@ def settings_from(document: dict[str, Any], source: str = "settings") -> Setting
         As :func:`read_settings`.
     """
     sections = get_type_hints(Settings)
-    _refuse_unknown(document, sections, source)
+    del sections["files"]
+    _refuse_unknown(document, [*sections, "columns", "units"], source)
     chosen = {}
     for name, values in document.items():
         where = f"{source}: [{name}]"
         if not isinstance(values, dict):
             raise ValueError(f"{where} must be a section")
-        chosen[name] = _section(sections[name], values, where)
-    return Settings(**chosen)
+        if name in sections:
+            chosen[name] = _section(sections[name], values, where)
+    chosen["files"] = _files(document.get("columns", {}), document.get("units", {}), source)
+    settings = Settings(**chosen)
+    try:
+        settings.robust  # noqa: B018  (thresholds that do not fit are refused here)
+    except ValueError as error:
+        raise ValueError(f"{source}: [kernel] {error}") from None
+    return settings
+
+
+def _files(columns: dict[str, Any], units: dict[str, Any], source: str) -> dict[str, FileReading]:
+    """Take what [columns] and [units] say of files that are not as docs/logs.md has them."""
+    stems = {name.removesuffix(".csv"): name for name in FILES}
+    made: dict[str, FileReading] = {}
+    for section, said in (("columns", columns), ("units", units)):
+        _refuse_unknown(said, stems, f"{source}: [{section}]")
+        for stem, values in said.items():
+            where = f"{source}: [{section}.{stem}]"
+            if not isinstance(values, dict):
+                raise ValueError(f"{where} must be a section")
+            known = columns_of(stems[stem])
+            given = dict(values)
+            options: dict[str, Any] = {}
+            if section == "columns":
+                options = {key: given.pop(key) for key in FILE_KEYS if key in given}
+                for key, value in options.items():
+                    _choose(FILE_KEYS[key], value, f"{where} {key}")
+            _refuse_unknown(given, known, where)
+            for column, value in given.items():
+                if section == "columns":
+                    _choose((), value, f"{where} {column}")
+                else:
+                    kinds = tuple(UNITS.get(COLUMNS[column].unit, {}))
+                    if not kinds:
+                        raise ValueError(f"{where} {column} has no unit")
+                    _choose(kinds, value, f"{where} {column}")
+            before = made.get(stems[stem], FileReading(where=where))
+            changed: dict[str, Any] = {section: given, **options}
+            made[stems[stem]] = replace(before, **changed)
+    return made
+
+
+def _choose(kinds: tuple[str, ...], value: object, where: str) -> None:
+    if not isinstance(value, str) or not value:
+        raise ValueError(f"{where} must be a text, not {value!r}")
+    if kinds and value not in kinds:
+        raise ValueError(f"{where} must be one of {', '.join(map(repr, kinds))}, not {value!r}")
 
 
 def _section(kind: type[Any], values: dict[str, Any], where: str) -> Any:

@@ -416,6 +416,7 @@ def _noises() -> Iterator[Hypothesis]:
                     sigma_distance=times * s.odometry.sigma_distance,
                     sigma_drift=times * s.odometry.sigma_drift,
                     sigma_turn=times * s.odometry.sigma_turn,
+                    sigma_turned=times * s.odometry.sigma_turned,
                 ),
                 ranges=replace(s.ranges, sigma_m=times * s.ranges.sigma_m),
                 positions=replace(s.positions, sigma_m=times * s.positions.sigma_m),
@@ -426,7 +427,11 @@ def _noises() -> Iterator[Hypothesis]:
                 ),
                 process=replace(
                     s.process,
-                    **{name: times**2 * value for name, value in vars(s.process).items()},
+                    **{
+                        name: times**2 * value
+                        for name, value in vars(s.process).items()
+                        if name.endswith("_psd")
+                    },
                 ),
             )
 

@@ -320,6 +320,7 @@ class Localiser(Replay):
                 sigma_distance=noise.sigma_distance,
                 sigma_drift=noise.sigma_drift,
                 sigma_turn=noise.sigma_turn,
+                sigma_turned=noise.sigma_turned,
             ),
             "sensors": self._own_sensors(),
         }
@@ -557,6 +558,7 @@ class Tracker(Replay):
             position_psd=process.position_psd,
             velocity_psd=process.velocity_psd,
             acceleration_psd=process.acceleration_psd,
+            discretisation=process.discretisation,
         )
         if self.spatial:
             self._process = WhiteAcceleration(
@@ -600,8 +602,9 @@ class Tracker(Replay):
             )
         if self.filter_name == "aukf":
             policy = interval_policy(self.settings.interval)
-            alpha = self.settings.filter.alpha
-            self._filter: GaussianFilter = Aukf(x0, P0, policy=policy, alpha=alpha, **models)
+            models |= {**_points(self.settings), "dtype": self.settings.filter.dtype}
+            models["longest_step_s"] = self.settings.filter.longest_step_s
+            self._filter = Aukf(x0, P0, policy=policy, **models)
         else:
             self._filter = _build(self.filter_name, self.settings, x0, P0, models, self._late_s)
         self._now, self._started = time, True
@@ -846,11 +849,19 @@ def _build(
     models["late_s"] = late_s
     models["components"] = settings.filter.components
     models["headings"] = settings.filter.headings
+    models["dtype"] = settings.filter.dtype
     if issubclass(kind, (RobustEkf, RobustUkf)):
-        models["kernel"] = settings.filter.kernel
+        models["kernel"], models["recovery"] = settings.robust
+        for key in ("residual", "max_iterations", "tolerance"):
+            models[key] = getattr(settings.filter, key)
     if issubclass(kind, Ukf):
-        models["alpha"] = settings.filter.alpha
+        models |= _points(settings)
     return kind(x0, P0, **models)
+
+
+def _points(settings: Settings) -> dict[str, float | None]:
+    """Give the parameters of the sigma points."""
+    return {key: getattr(settings.filter, key) for key in ("alpha", "beta", "kappa")}
 
 
 def interval_policy(settings: IntervalSettings) -> IntervalPolicy:
@@ -858,10 +869,14 @@ def interval_policy(settings: IntervalSettings) -> IntervalPolicy:
     if settings.policy == "fixed":
         return FixedInterval(interval_s=settings.interval_s)
     low, high = settings.min_s, settings.max_s
+    limits: dict[str, Any] = {"initial_s": settings.initial_s or low, "min_s": low, "max_s": high}
     if settings.policy == "mahalanobis":
-        return MahalanobisInterval(initial_s=low, min_s=low, max_s=high)
-    sigma = settings.position_sigma_m
-    return CovarianceBudget(initial_s=low, min_s=low, max_s=high, position_sigma_m=sigma)
+        names = ("tau0", "scale", "epsilon", "gamma1_m2", "gamma2", "ratio_max", "tau_min",
+                 "tau_max")  # fmt: skip
+        given = {name: getattr(settings, name) for name in names}
+        said = {name: value for name, value in given.items() if value is not None}
+        return MahalanobisInterval(**limits, **said)
+    return CovarianceBudget(position_sigma_m=settings.position_sigma_m, **limits)
 
 
 def updates_of(results: list[RunResult]) -> dict[str, npt.NDArray[Any]]:

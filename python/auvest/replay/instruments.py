@@ -202,7 +202,14 @@ class Instruments:
         a, b, c = noise.tolist()
         fixes = self._settings.fixes
         if sensor == tables.RANGE:
-            return LeaderRange(sigma_range_m=a, sigma_leader_m=b)
+            # What a range leaves in the plane may be shorter than the smallest range.
+            ranges, levelled = self._settings.ranges, self._levelled
+            return LeaderRange(
+                sigma_range_m=a,
+                sigma_leader_m=b,
+                smallest_range_m=min(ranges.smallest_m, 0.0) if levelled else ranges.smallest_m,
+                largest_range_m=ranges.largest_m,
+            )
         if sensor == tables.FIX and self._spatial:
             return RangeBearingElevation(
                 sigma_range_m=a,

@@ -48,7 +48,8 @@ class Tally:
         nis = measured["nis"][compared]
         self._nis += float(nis.sum())
         self._nis_count += len(nis)
-        for name in ("innovation_0", "innovation_1", "innovation_2"):
+        self._numbers += len(nis)
+        for name in ("innovation_1", "innovation_2"):  # of those with more numbers than one
             self._numbers += int((~np.isnan(measured[name][compared])).sum())
         held = measured["held_out_error_m"]
         held = held[~np.isnan(held)]

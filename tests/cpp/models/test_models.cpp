@@ -1005,6 +1005,18 @@ TEST_CASE("odometry: increments compose") {
   CHECK(model.Q(4)(0, 0) == close_to(0.0025 * 10 + 0.01 * 4, 1e-14));
 }
 
+TEST_CASE("odometry: the heading's noise grows with time and, where told, with the turn") {
+  auvest::Odometry<double> model;
+  model.input << 3, 1, -0.5;
+  CHECK(model.Q(4)(2, 2) == 1e-6 * 4);
+  model.params.sigma_turned = 0.1;
+  // 10 % of half a rad, whichever way, and 0.001 rad/sqrt(s) for 4 s.
+  CHECK(model.Q(4)(2, 2) == close_to(0.0025 + 1e-6 * 4, 1e-14));
+  CHECK(model.Q(4)(0, 0) == close_to(0.0025 * 10 + 0.01 * 4, 1e-14));
+  model.params.sigma_turned = -0.1;
+  CHECK(model.check() == auvest::Status::kBadParameter);
+}
+
 TEST_CASE("leader range: the leader's uncertainty adds to R; at the leader nothing moves") {
   const auto model = leader<2>(7, 8);
   CHECK(model.R()(0, 0) == 25);

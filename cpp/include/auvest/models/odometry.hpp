@@ -5,7 +5,8 @@
 //     (x, y) += R(theta) (forward, sideways),   theta += turn
 //
 // The noise is that of real logs: a part that goes with the distance (scale, slip) and a part that
-// goes with time (drift, current), alike in all directions, and the heading's own.
+// goes with time (drift, current), alike in all directions; the heading's goes with time (drift of
+// the gyro) and, where told, with the turn (scale of the gyro, slip of wheels).
 //
 // theta is not wrapped: it counts turns, so that no filter sees a jump.
 #pragma once
@@ -28,6 +29,7 @@ struct Odometry : ProcessModel<Odometry<Scalar_>, Scalar_, 3> {
     Scalar sigma_distance = Scalar(0.05);  ///< of the distance of one increment [1]
     Scalar sigma_drift = Scalar(0.1);      ///< [m/sqrt(s)]
     Scalar sigma_turn = Scalar(0.001);     ///< [rad/sqrt(s)]
+    Scalar sigma_turned = Scalar(0);       ///< of the turn of one increment [1]
 
     /// Names every member, in the order of stored records.
     template <class Visitor>
@@ -35,6 +37,7 @@ struct Odometry : ProcessModel<Odometry<Scalar_>, Scalar_, 3> {
       v("sigma_distance", sigma_distance);
       v("sigma_drift", sigma_drift);
       v("sigma_turn", sigma_turn);
+      v("sigma_turned", sigma_turned);
     }
   };
 
@@ -72,14 +75,15 @@ struct Odometry : ProcessModel<Odometry<Scalar_>, Scalar_, 3> {
     Covariance q;
     math::set_zero(q);
     q(0, 0) = q(1, 1) = position;
-    q(2, 2) = dt * params.sigma_turn * params.sigma_turn;
+    const Scalar spread = params.sigma_turned * input(2);
+    q(2, 2) = dt * params.sigma_turn * params.sigma_turn + spread * spread;
     return q;
   }
 
   Status check() const {
-    const bool valid = math::is_nonnegative(params.sigma_distance) &&
-                       math::is_nonnegative(params.sigma_drift) &&
-                       math::is_nonnegative(params.sigma_turn);
+    const bool valid =
+        math::is_nonnegative(params.sigma_distance) && math::is_nonnegative(params.sigma_drift) &&
+        math::is_nonnegative(params.sigma_turn) && math::is_nonnegative(params.sigma_turned);
     return valid ? Status::kOk : Status::kBadParameter;
   }
 

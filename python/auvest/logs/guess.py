@@ -1,0 +1,249 @@
+"""A first guess at what a folder of tables holds: by the names of files and columns, and numbers.
+
+:func:`guess` gives what ``auvest init`` writes. It is a guess: it says what it took for what.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from itertools import islice
+from pathlib import Path
+
+from auvest._outputs import is_plain_file
+from auvest.logs.layout import COLUMNS, FILES, match
+from auvest.logs.reading import SEPARATORS, UNITS, FileReading, columns_of, seconds_of
+
+#: Lines of a table that are looked at, and the largest header that is one.
+LINES, LONGEST = 200, 10_000
+#: Names of columns as instruments write them, and the column of a log that each is.
+NAMES: Mapping[str, str] = {
+    r"(utc_?)?(date_?)?time(_?stamp)?|stamp|utc|epoch|t|ts|date|received|zeit": "time_s",
+    r"source|beacon|transponder|remote(_id)?|node|leader|ship|station|id|src": "source",
+    r"(slant_?)?(range|distance|dist)|slant": "range_m",
+    r"lat(itude)?": "latitude_deg",
+    r"lon(gitude)?|lng|long": "longitude_deg",
+    r"x|east(ing)?": "x_m",
+    r"y|north(ing)?": "y_m",
+    r"(true_?)?(heading|hdg|hdt|compass)|yaw": "compass_rad",
+    r"bearing|azimuth|az": "azimuth_rad",
+    r"elevation|elev|el": "elevation_rad",
+    r"v_?x|u|surge|forward|fwd|speed|vel(ocity)?_?x": "speed_m_s",
+    r"v_?y|v|sway|starboard|stbd|vel(ocity)?_?y": "starboard_m_s",
+    r"gyro_?z|yaw_?rate|r|w_?z": "yaw_rate_rad_s",
+    r"depth|keller|pole": "depth_m",
+}
+#: Units as headers write them.
+_WRITTEN = {
+    "mm_s": "mm/s", "cm_s": "cm/s", "m_s": "m/s", "km_h": "km/h", "knots": "kn", "kt": "kn",
+    "kts": "kn", "deg_s": "deg/s", "rad_s": "rad/s", "degrees": "deg", "°": "deg", "sec": "s",
+    "msec": "ms", "usec": "us", "µs": "us",
+}  # fmt: skip
+#: Words in the name of a file of places that say what they are.
+_PLACES = ("truth", "start", "leaders", "beacons", "positions")
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of a folder, as far as it was looked at."""
+
+    path: Path
+    separator: str
+    decimal: str
+    header: list[str]
+    rows: list[list[str]]
+
+
+@dataclass
+class Guess:
+    """What a folder seems to hold.
+
+    Attributes
+    ----------
+    files : dict of str to FileReading
+        The files of a log that are not as docs/logs.md says, by their names there.
+    unknown : list of str
+        Tables of which nothing is known.
+    """
+
+    files: dict[str, FileReading] = field(default_factory=dict)
+    unknown: list[str] = field(default_factory=list)
+
+
+def guess(folder: Path) -> Guess:
+    """Look at the tables of a folder and say which file of a log each may be."""
+    found = Guess()
+    taken = {name for name in FILES if _is_log_file(folder / name, name)}
+    for path in sorted(folder.iterdir()):
+        if path.suffix.lower() not in (".csv", ".tsv", ".txt", ".dat", ".log"):
+            continue
+        if path.name in taken or path.name.startswith(".") or not is_plain_file(path):
+            continue
+        seen = table_of(path)
+        named = {} if seen is None else _columns(seen)
+        kinds = [] if seen is None else list(_kinds(path.stem.lower(), set(named), taken))
+        for name in kinds:
+            assert seen is not None
+            found.files[name] = _reading(name, seen, named)
+            taken.add(name)
+        if not kinds:
+            found.unknown.append(path.name)
+    return found
+
+
+def table_of(path: Path) -> Table | None:
+    """Read the first lines of a table; None if it is none."""
+    try:
+        with path.open(encoding="utf-8-sig") as file:
+            lines = [line.rstrip("\r\n") for line in islice(file, LINES + 1)]
+    except (OSError, UnicodeDecodeError):
+        return None
+    if len(lines) < 2 or not lines[0].strip() or max(map(len, lines)) > LONGEST:
+        return None
+    for separator in (";", "\t", "|", ",", " "):
+        rows = [_cells(line, separator) for line in lines if line.strip()]
+        width = len(rows[0])
+        if width < 2 or sum(len(row) == width for row in rows) < 0.9 * len(rows):
+            continue
+        body = [row for row in rows[1:] if len(row) == width]
+        header = [cell.strip() for cell in rows[0]]
+        if separator in SEPARATORS and len(set(header)) == width and not any(map(_number, header)):
+            commas = sum(bool(re.fullmatch(r"\s*-?\d+,\d+\s*", c)) for row in body for c in row)
+            decimal = "," if separator != "," and commas else "."
+            return Table(path, separator, decimal, header, body)
+    return None
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    if separator == " ":
+        return line.split()
+    with suppress(csv.Error):
+        return next(csv.reader([line], delimiter=separator), [])
+    return []
+
+
+def _number(cell: str) -> bool:
+    with suppress(ValueError):
+        return math.isfinite(float(cell))
+    return False
+
+
+def _is_log_file(path: Path, name: str) -> bool:
+    """Whether a file is one of a log as it is."""
+    if not path.exists():
+        return False
+    seen = table_of(path)
+    return seen is not None and seen.separator == "," and match(name, seen.header) is not None
+
+
+def _columns(seen: Table) -> dict[str, tuple[str, str]]:
+    """Give the columns of a log that a table seems to have: each one's own name and unit."""
+    found: dict[str, tuple[str, str]] = {}
+    for k, own in enumerate(seen.header):
+        name, unit = _parted(own)
+        column = name if name in COLUMNS else next(
+            (one for words, one in NAMES.items() if re.fullmatch(words, name)), None
+        )  # fmt: skip
+        if column is None or column in found:
+            continue
+        cells = [row[k] for row in seen.rows]
+        if column == "time_s" and _all_times(cells):
+            column, unit = "time", ""
+        elif not _numbers(cells, seen.decimal):
+            continue
+        kinds = UNITS.get(COLUMNS[column].unit, {})
+        if unit not in kinds:
+            unit = _by_size(column, _numbers(cells, seen.decimal))
+        found[column] = (own, unit)
+    speeds = [one for one in found if COLUMNS[one].unit == "m/s"]
+    if any(found[one][1] == "mm/s" for one in speeds):  # of one instrument
+        found |= {one: (found[one][0], found[one][1] or "mm/s") for one in speeds}
+    return found
+
+
+def _parted(own: str) -> tuple[str, str]:
+    """Part the name of a column and its unit: ``Speed [mm/s]``, ``depth_cm``, ``heading (deg)``."""
+    text = own.strip().lower()
+    if text in COLUMNS:
+        return text, ""
+    inside = re.fullmatch(r"(.+?)[\s_]*[\[(]\s*(.+?)\s*[\])]", text)
+    name, unit = inside.groups() if inside else (text, "")
+    name = re.sub(r"[\s\-.]+", "_", name.strip())
+    units = {unit for kinds in UNITS.values() for unit in kinds} | set(_WRITTEN)
+    if not unit:
+        for end in sorted(units, key=len, reverse=True):
+            if name.endswith(f"_{end}"):
+                name, unit = name.removesuffix(f"_{end}"), end
+                break
+    return name, _WRITTEN.get(unit, unit)
+
+
+def _all_times(cells: list[str]) -> bool:
+    try:
+        return [seconds_of(cell) for cell in cells] != []
+    except ValueError:
+        return False
+
+
+def _numbers(cells: list[str], decimal: str) -> list[float]:
+    """Give the numbers of a column; none if one cell is none."""
+    try:
+        return [float(cell.replace(",", ".") if decimal == "," else cell) for cell in cells]
+    except ValueError:
+        return []
+
+
+def _by_size(column: str, numbers: list[float]) -> str:
+    """Say what unit numbers are in of which no name says it; "" for that of the log."""
+    largest = max(map(abs, numbers), default=0.0)
+    unit = COLUMNS[column].unit
+    if unit == "s":
+        limits = {"ns": 1e17, "us": 1e14, "ms": 1e11}
+        return next((name for name, low in limits.items() if largest > low), "")
+    if unit == "rad" and largest > 2 * math.pi + 1e-6:
+        return "deg"
+    if unit == "deg" and largest > 360:
+        return "1e-7 deg"
+    if unit == "m/s" and largest > 50:
+        return "mm/s"
+    return ""
+
+
+def _kinds(stem: str, columns: set[str], taken: set[str]) -> Iterator[str]:
+    """Say which files of a log a table may be, by what it has; each only once."""
+    timed = bool({"time", "time_s"} & columns)
+    placed = {"latitude_deg", "longitude_deg"} <= columns or {"x_m", "y_m"} <= columns
+    said = next((f"{word}.csv" for word in _PLACES if word.rstrip("s") in stem), None)
+    wanted = []
+    if placed:
+        if said is None:
+            of_sources = "leaders.csv" if timed else "beacons.csv"
+            said = of_sources if "source" in columns else "positions.csv"
+        wanted.append(said)
+    elif "range_m" in columns and "source" in columns:
+        bearing = {"azimuth_rad", "bearing_rad"} & columns
+        wanted.append("fixes.csv" if bearing else "ranges.csv")
+    else:
+        if {"speed_m_s", "forward_m", "distance_m"} & columns:
+            wanted.append("odometry.csv")
+        headed = {"compass_rad", "heading_rad"} & columns
+        if headed and "speed_m_s" not in columns:
+            wanted.append("compass.csv")
+        if "depth_m" in columns:
+            wanted.append("depth.csv")
+    yield from (name for name in wanted if name not in taken and match(name, columns) is not None)
+
+
+def _reading(name: str, seen: Table, named: Mapping[str, tuple[str, str]]) -> FileReading:
+    known = [column for column in columns_of(name) if column in named]
+    return FileReading(
+        file="" if seen.path.name == name else seen.path.name,
+        separator=seen.separator,
+        decimal=seen.decimal,
+        columns={column: named[column][0] for column in known if named[column][0] != column},
+        units={column: named[column][1] for column in known if named[column][1]},
+    )

@@ -1,0 +1,134 @@
+"""``auvest init``: a first settings file, of a log as it is and of what recorders left."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from test_check import arc
+from typer.testing import CliRunner
+
+from auvest.cli import app
+from auvest.logs.guess import guess, table_of
+from auvest.logs.write import write_file
+from auvest.replay import Settings, read_settings
+from auvest.replay.first import first_settings
+from auvest.replay.schema import SCHEMA, text
+
+
+def recorders(folder: Path) -> Path:
+    """The log of ``arc`` as others write it: a DVL in mm/s, a yaw rate in degrees, milliseconds."""
+    arc(folder)
+    time = np.arange(61)
+    rows = "".join(f"{1764316800000 + 1000 * t};1000,0;1,1459156\n" for t in time)
+    (folder / "odometry.csv").unlink()
+    (folder / "dvl_export.csv").write_text(f"Timestamp;Vx;Yaw rate [deg/s]\n{rows}")
+    ranges = (folder / "ranges.csv").read_text().splitlines()[1:]
+    (folder / "ranges.csv").unlink()
+    parted = [line.split(",") for line in ranges]
+    lines = [f"{1764316800 + float(t)}\t{k}\t{r}\tx\n" for t, k, r in parted]
+    (folder / "modem.txt").write_text("t [s]\tBeacon\tSlant range (m)\tcomment\n" + "".join(lines))
+    write_file(folder, "start.csv", time_s=[1764316800.0], x_m=[0.0], y_m=[0.0], heading_rad=[0.0])
+    (folder / "truth.csv").unlink()
+    (folder / "voltages.csv").write_text("a,b\n1,2\n3,4\n")
+    return folder
+
+
+def test_recorders_files_are_guessed_and_the_log_is_sound(tmp_path: Path) -> None:
+    made = first_settings(recorders(tmp_path))
+    assert made.unknown == ["voltages.csv"]
+    assert made.checked.verdict == "sound"
+    (tmp_path / "auvest.toml").write_text(made.text)
+    files = read_settings(tmp_path / "auvest.toml").files
+    assert set(files) == {"odometry.csv", "ranges.csv"}
+    dvl, modem = files["odometry.csv"], files["ranges.csv"]
+    assert (dvl.file, dvl.separator, dvl.decimal) == ("dvl_export.csv", ";", ",")
+    assert dvl.columns == {
+        "time_s": "Timestamp", "speed_m_s": "Vx", "yaw_rate_rad_s": "Yaw rate [deg/s]",
+    }  # fmt: skip
+    assert dvl.units == {"time_s": "ms", "speed_m_s": "mm/s", "yaw_rate_rad_s": "deg/s"}
+    assert (modem.file, modem.separator) == ("modem.txt", "\t")
+    assert modem.columns["range_m"] == "Slant range (m)"
+
+
+def test_a_log_as_it_is_needs_no_mapping_and_its_noise_is_seen(tmp_path: Path) -> None:
+    """The ranges of ``arc`` have 0.1 m; the default is ten times that."""
+    made = first_settings(arc(tmp_path))
+    (tmp_path / "auvest.toml").write_text(made.text)
+    settings = read_settings(tmp_path / "auvest.toml")
+    assert (settings.files, settings.odometry) == ({}, Settings().odometry)
+    assert 0.05 < settings.ranges.sigma_m < 0.2
+
+
+def test_what_is_found_stands_in_comments(tmp_path: Path) -> None:
+    arc(tmp_path)
+    (tmp_path / "range.csv").write_text("time_s,source\n0,1\n")
+    made = first_settings(tmp_path)
+    assert "# auvest check says: sound" in made.text
+    assert "#   ignored_file: range.csv: is not read" in made.text
+    assert "# Nothing is known of range.csv." in made.text
+
+
+@pytest.mark.parametrize(
+    ("name", "header", "row", "kind"),
+    [
+        ("gps.csv", "utc,lat,lon", "2026-05-04T06:30:00Z,43.1,5.9", "positions.csv"),
+        ("gps_truth.csv", "utc,lat,lon", "2026-05-04T06:30:00Z,43.1,5.9", "truth.csv"),
+        ("buoys.csv", "id,Easting [m],Northing [m]", "1,5.0,7.0", "beacons.csv"),
+        ("ships.csv", "t,ship,x,y", "1.0,3,5.0,7.0", "leaders.csv"),
+        ("usbl.csv", "t,id,range,azimuth (deg)", "1.0,3,50.0,270", "fixes.csv"),
+        ("keller.csv", "t,depth_cm", "1.0,330", "depth.csv"),
+        ("hdt.csv", "t,heading", "1.0,330", "compass.csv"),
+        ("wheel.csv", "t,distance,turn_rad", "1.0,0.5,0.1", None),
+        ("notes.txt", "in the morning, rain", "then, sun", None),
+    ],
+)
+def test_what_a_table_is(tmp_path: Path, name: str, header: str, row: str, kind: Any) -> None:
+    (tmp_path / name).write_text(f"{header}\n{row}\n{row}\n")
+    found = guess(tmp_path)
+    assert list(found.files) == ([kind] if kind else [])
+    assert found.unknown == ([] if kind else [name])
+
+
+def test_units_by_name_and_by_size(tmp_path: Path) -> None:
+    (tmp_path / "usbl.csv").write_text("t [ms],id,range (cm),bearing\n1,3,50.0,270\n2,3,51,1\n")
+    (made,) = guess(tmp_path).files.values()
+    assert made.units == {"time_s": "ms", "range_m": "cm", "azimuth_rad": "deg"}
+
+
+def test_a_table_has_a_header_of_names(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    for wrong in ("1,2\n3,4\n", "a\nb\n", "", "a,a\n1,2\n"):
+        path.write_text(wrong)
+        assert table_of(path) is None
+    path.write_bytes(b"\xff\xfe")
+    assert table_of(path) is None
+
+
+def call(*arguments: object) -> Any:
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def test_the_command_writes_once(tmp_path: Path) -> None:
+    arc(tmp_path / "log")
+    told = call("init", tmp_path / "log", "--json", "--quiet")
+    assert told.exit_code == 0, told.output
+    document = json.loads(told.stdout)
+    path = tmp_path / "log" / "auvest.toml"
+    assert (document["settings"], document["verdict"]) == (str(path), "sound")
+    assert path.read_text().startswith(f"#:schema {SCHEMA.as_uri()}\n")
+    path.write_text("# mine\n")
+    refused = call("init", tmp_path / "log")
+    assert refused.exit_code == 2
+    assert "--force replaces it" in refused.stderr
+    assert path.read_text() == "# mine\n"
+    assert call("init", tmp_path / "log", "--force", "--quiet").exit_code == 0
+    assert path.read_text() != "# mine\n"
+    assert "is not a folder" in call("init", tmp_path / "nowhere").stderr
+
+
+def test_the_command_prints_the_schema() -> None:
+    assert call("init", "--schema").stdout == text()
