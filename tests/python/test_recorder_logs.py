@@ -168,6 +168,8 @@ def test_usblangles_of_evologics(tmp_path: Path) -> None:
     assert message.values["true_bearing_rad"] == 0.3
     assert message.values["accuracy_rad"] == 0.005
     assert message.stamp_ns == 20_250_000_000
+    (message,) = messages(written(tmp_path, "usbl.txt", line.replace("20.25", "1e308")))
+    assert message.stamp_ns is None  # which is no time
 
 
 def test_dvl_of_json_v3_has_the_time_of_validity(tmp_path: Path) -> None:
@@ -301,6 +303,19 @@ def test_nmea_says_how_it_is_read(tmp_path: Path) -> None:
     }
 
 
+def quaternion(yaw: float, pitch: float, roll: float) -> tuple[float, float, float, float]:
+    """About z, then the new y, then the new x: the product of three turns."""
+    c, s = (
+        [function(angle / 2) for angle in (yaw, pitch, roll)] for function in (math.cos, math.sin)
+    )
+    return (
+        c[0] * c[1] * c[2] + s[0] * s[1] * s[2],
+        c[0] * c[1] * s[2] - s[0] * s[1] * c[2],
+        c[0] * s[1] * c[2] + s[0] * c[1] * s[2],
+        s[0] * c[1] * c[2] - c[0] * s[1] * s[2],
+    )
+
+
 # ---- Mappings ------------------------------------------------------------------------------------
 
 
@@ -322,8 +337,12 @@ def test_nmea_says_how_it_is_read(tmp_path: Path) -> None:
         # North 1, east 2, heading east: ahead is east, and to starboard is south.
         ({"along": ["n", "e", "h"]}, {"n": 1, "e": 2, "h": math.pi / 2}, 2),
         ({"across": ["n", "e", "h"]}, {"n": 1, "e": 2, "h": math.pi / 2}, -1),
-        # A quarter turn about z.
-        ({"yaw": ["w", 0, 0, "z"]}, {"w": math.sqrt(0.5), "z": math.sqrt(0.5)}, math.pi / 2),
+        # Heading 0.6 of a vehicle with pitch 0.4 and roll 0.2: products of half angles.
+        (
+            {"yaw": ["w", "x", "y", "z"]},
+            dict(zip("wxyz", quaternion(0.6, 0.4, 0.2), strict=True)),
+            0.6,
+        ),
     ],
 )
 def test_expressions(given: Any, values: dict[str, Any], expected: float | None) -> None:

@@ -199,7 +199,7 @@ def _date_of(values: dict[str, Value], before: int | None) -> int | None:
 def _stamp(name: str, values: dict[str, Value], date_ns: int | None) -> int | None:
     if name in ("USBLLONG", "USBLANGLES"):
         measured = values.get("measured_s")
-        return plausible(round(measured * 1e9)) if isinstance(measured, (int, float)) else None
+        return nanoseconds(repr(measured)) if isinstance(measured, (int, float)) else None
     seconds = values.get("utc_s")
     if not isinstance(seconds, (int, float)) or date_ns is None:
         return None

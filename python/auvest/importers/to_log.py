@@ -17,7 +17,7 @@ from auvest.importers.recording import Message, Recording, RecordingError
 from auvest.logs.reader import LogError, LogFolder
 
 #: Rows that may wait for another topic at once.
-_MOST_WAITING = 10_000
+_MOST_WAITING = 1000
 
 
 @dataclass(frozen=True)
@@ -265,7 +265,7 @@ class _Source:
                 topic not in beside or _time_of(beside[topic]) < _time_of(message)
                 for topic in self.others
             )
-            late = _time_of(now) - _time_of(message) > WITHIN_S * 1e9
+            late = _apart_ns(now, message) > WITHIN_S * 1e9  # or the clock has jumped back
             if waits and not late and len(self.waiting) < _MOST_WAITING:
                 return
             yield self.waiting.popleft()
