@@ -1,10 +1,27 @@
-"""Traces side by side, bit by bit."""
+"""Traces side by side, bit by bit, of the targets that are asked for."""
 
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from auvest.firmware.hil import ulps
+from firmware.parity.targets import Target
+from tests.slow import ASKED, SLOW
+
+#: Other flags and compilers for machines that the remaining targets have, too.
+FURTHER = {"gcc-O3-march=native", "clang-O0", "atmega2560-O2", "cortex-m3"}
+
+
+def asked_for(target: Target) -> bool:
+    """Whether a target is replayed: the further ones and the chips of QEMU are slow tests."""
+    return ASKED or not (target.name in FURTHER or target.machine == "chip")
+
+
+def target_params(targets):
+    """Parameters of a test, one for each target."""
+    for target in targets:
+        yield pytest.param(target, id=target.name, marks=() if asked_for(target) else SLOW)
 
 
 def differing_bits(a: np.ndarray, b: np.ndarray) -> int:

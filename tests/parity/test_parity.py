@@ -6,7 +6,6 @@ filter never keeps one, and where a measurement is missing the trace has the one
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -18,17 +17,20 @@ from firmware import chips
 from firmware.chips import CHIPS
 from firmware.parity import golden
 from firmware.parity.targets import CHIP_TARGETS, TARGETS
-from tests.parity.comparison import differing_bits, first_difference
+from tests.parity.comparison import (
+    asked_for,
+    differing_bits,
+    first_difference,
+    target_params,
+)
 from tests.parity.records import REFERENCED, SELF_TEST, TRACE, all_records, bytes_of, trace_of
+from tests.slow import SLOW
 
 CONTROLS = Path(__file__).parent / "controls"
 RECORDS = all_records()
 BY_NAME = {record.name: record for record in RECORDS}
 TARGET = {target.name: target for target in TARGETS}
-SLOW = pytest.mark.skipif(
-    "AUVEST_SLOW_TESTS" not in os.environ, reason="AUVEST_SLOW_TESTS is not set"
-)
-#: With AUVEST_SLOW_TESTS each record runs on each of the chips of QEMU; without, this one on this.
+#: Of the chips of QEMU the one that is always replayed, and its record.
 SHORT = ("riscv32imc", "gaps")
 
 #: avr-libc's own division rounds subnormal quotients down; this record lives of them.
@@ -43,10 +45,11 @@ def pairs():
                 continue
             if (record.name, target.name) == (SUBNORMAL_QUOTIENTS, "atmega2560-O2"):
                 continue  # its own test, below
-            yield pytest.param(record, target, id=f"{target.name}-{record.name}")
+            marks = () if asked_for(target) else SLOW
+            yield pytest.param(record, target, id=f"{target.name}-{record.name}", marks=marks)
     for target in CHIP_TARGETS:
         for record in RECORDS:
-            marks = () if (target.name, record.name) == SHORT else SLOW
+            marks = () if (target.name, record.name) == SHORT or asked_for(target) else SLOW
             yield pytest.param(record, target, id=f"{target.name}-{record.name}", marks=marks)
 
 
@@ -60,6 +63,7 @@ def test_every_target_gives_the_bits_of_python(record, target, replay, expected)
     )
 
 
+@SLOW
 def test_the_one_known_disagreement_is_still_there(replay, expected):
     """Without the library's float routines, equal bits exclude quotients below 1.2e-38.
 
@@ -70,7 +74,7 @@ def test_the_one_known_disagreement_is_still_there(replay, expected):
     assert first_difference(expected(record), found) is not None
 
 
-@pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.name)
+@pytest.mark.parametrize("target", target_params(TARGETS))
 def test_the_self_test_passes_on_every_target(target, replay):
     assert self_test_of(replay(target, SELF_TEST)) == (SelfTestPart.none, 0)
 
@@ -149,7 +153,16 @@ BROKEN = {
 }
 
 
-@pytest.mark.parametrize("broken", BROKEN)
+#: One for each part of the self-test, on what is replayed anyway; the others take a build each.
+ALWAYS = {
+    *("libm of avr-libc", "fused on Cortex-M4F", "rounding upward", "flushed on Cortex-M4F"),
+    "reordered by clang",
+}
+
+
+@pytest.mark.parametrize(
+    "broken", [pytest.param(name, marks=() if name in ALWAYS else SLOW) for name in BROKEN]
+)
 def test_what_breaks_the_bits_is_noticed(broken, replay, expected):
     name, part, *extra = BROKEN[broken]
     failed, _ = self_test_of(replay(TARGET[name], SELF_TEST, *extra))

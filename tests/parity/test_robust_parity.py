@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from itertools import pairwise
 
 import numpy as np
@@ -10,7 +9,7 @@ import pytest
 
 from auvest import Decision, Status
 from firmware.parity.targets import CHIP_TARGETS, TARGETS
-from tests.parity.comparison import differing_bits, first_difference
+from tests.parity.comparison import differing_bits, first_difference, target_params
 from tests.parity.robust_records import all_records
 
 RECORDS = all_records()
@@ -22,16 +21,8 @@ def robust_expected():
     return {record.name: record.replay_in_python() for record in RECORDS}
 
 
-def targets():
-    yield from (pytest.param(target, id=target.name) for target in TARGETS)
-    slow = pytest.mark.skipif(
-        "AUVEST_SLOW_TESTS" not in os.environ, reason="AUVEST_SLOW_TESTS is not set"
-    )
-    yield from (pytest.param(target, id=target.name, marks=slow) for target in CHIP_TARGETS)
-
-
 @pytest.mark.parametrize("record", RECORDS, ids=lambda record: record.name)
-@pytest.mark.parametrize("target", list(targets()))
+@pytest.mark.parametrize("target", target_params([*TARGETS, *CHIP_TARGETS]))
 def test_every_target_gives_the_bits_of_python(record, target, replay, robust_expected):
     found = record.trace_of(replay(target, record.to_bytes()))
     wanted = robust_expected[record.name]

@@ -21,8 +21,9 @@ from auvest.board import Board
 from firmware.parity import slatf
 from firmware.parity.slatf import all_records, fields_of, paper_echoes
 from firmware.parity.targets import AVR_PARTICLES, PARTICLES, SLATF_TARGETS
-from tests.parity.comparison import differing_bits
+from tests.parity.comparison import asked_for, differing_bits
 from tests.parity.slatf_python_leg import replay_in_python
+from tests.slow import SLOW
 
 #: Particles come in blocks (auvest/particles/lanes.hpp).
 BLOCK = 16
@@ -38,15 +39,6 @@ ON_CHIP = all_records(chip=True)
 #: Echoes of the paper's scenario on the ATmega2560 with -O2; the IDE's options get all 200, each
 #: half a second of its time.
 SHORT = 20
-
-
-#: The compilers of other targets with other flags, minutes of them: with AUVEST_SLOW_TESTS set.
-SLOW = {"clang-O0", "atmega2560-O2", "cortex-m3"}
-
-
-def targets():
-    slow = "AUVEST_SLOW_TESTS" in os.environ
-    return [target for target in SLATF_TARGETS if slow or target.name not in SLOW]
 
 
 def names_for(target):
@@ -83,7 +75,7 @@ def traces(build, runner, tmp_path_factory):
         return found
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        first = sorted(targets(), key=lambda target: target.machine != "avr")
+        first = sorted(filter(asked_for, SLATF_TARGETS), key=lambda target: target.machine != "avr")
         jobs = {target.name: pool.submit(replay, target) for target in first}
     return lambda target, name: jobs[target.name].result()[name]
 
@@ -129,8 +121,7 @@ def first_difference(expected, found):
 
 def pairs():
     for target in SLATF_TARGETS[1:]:
-        left_out = target not in targets()
-        marks = pytest.mark.skipif(left_out, reason="AUVEST_SLOW_TESTS is not set")
+        marks = () if asked_for(target) else SLOW
         for name in names_for(target):
             yield pytest.param(target, name, id=f"{target.name}-{name}", marks=marks)
 
@@ -163,6 +154,7 @@ def test_python_gives_the_bits_of_the_host(record, name, lanes, wanted):
             assert np.array_equal(trace[field], expected[field]), field
 
 
+@SLOW
 @pytest.mark.parametrize("name", RECORDS)
 def test_a_build_that_fuses_products_is_noticed(name, replay, wanted):
     record = RECORDS[name]

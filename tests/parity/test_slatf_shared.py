@@ -6,8 +6,6 @@ many particles as the desk. Minutes of compilers and of its simulated time: with
 
 from __future__ import annotations
 
-import os
-
 import numpy as np
 import pytest
 
@@ -17,10 +15,9 @@ from firmware.parity.targets import PARTICLES, SLATF_TARGETS
 from tests.parity.comparison import differing_bits
 from tests.parity.slatf_python_leg import replay_in_python
 from tests.parity.test_slatf import first_difference
+from tests.slow import SLOW
 
-pytestmark = pytest.mark.skipif(
-    "AUVEST_SLOW_TESTS" not in os.environ, reason="AUVEST_SLOW_TESTS is not set"
-)
+pytestmark = SLOW
 
 RECORD = shared_record()
 #: In lanes it is the particles of Slatf that run.

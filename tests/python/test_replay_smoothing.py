@@ -19,8 +19,8 @@ from typer.testing import CliRunner
 
 from auvest import RobustEkf
 from auvest.cli import app
+from auvest.importers.sets import IMPORTERS
 from auvest.logs import LogFolder, reader
-from auvest.logs.importers import IMPORTERS
 from auvest.logs.write import write_file
 from auvest.models import LeaderRange, Odometry
 from auvest.replay import Settings, find_settings, replay, settings_from
