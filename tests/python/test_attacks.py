@@ -127,7 +127,7 @@ def test_importers():
 
 
 def test_recorders():
-    counts = attacked(recorders.ATTACK, 120)
+    counts = attacked(recorders.ATTACK, 100)
     for kind in recorders.recordings():
         assert counts[f"{kind} listed"] + counts[f"{kind} not listed"] > 0
     assert sum(count for what, count in counts.items() if what.endswith("imported")) > 20
@@ -137,7 +137,7 @@ def test_the_attack_on_recorders_sees_an_exception(monkeypatch, capsys):
     kinds = {"alog": recorders.recordings()["alog"]}
     monkeypatch.setattr(recorders, "recordings", lambda: kinds)
     monkeypatch.setattr("auvest.importers.alog.nanoseconds", lambda text: int(float(text) * 1e9))
-    result = frame.run(recorders.ATTACK, 150, seed=1)
+    result = frame.run(recorders.ATTACK, 60, seed=1)
     assert "alog: list: ValueError" in result.failures
     capsys.readouterr()
 
