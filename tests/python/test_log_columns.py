@@ -514,3 +514,14 @@ def test_metres_and_degrees_need_an_origin(tmp_path: Path) -> None:
                heading_rad=[0.0])  # fmt: skip
     with pytest.raises(LogError, match=r"Say so in origin\.csv"):
         LogFolder(log)
+
+
+def test_the_heading_goes_on_in_a_gap_of_the_velocity(tmp_path: Path) -> None:
+    """A quarter turn in 20 s, of which the first 4 are driven at 1 m/s; then 4 m along +y."""
+    log = ranging(tmp_path, until_s=30.0)
+    write_file(log, "odometry.csv", time_s=[0.0, 20.0], speed_m_s=[1.0, 1.0],
+               heading_rad=[0.0, QUARTER])  # fmt: skip
+    settings = settings_from({"odometry": {"gap_s": 4.0}})
+    rate = QUARTER / 20
+    driven = (np.exp(4j * rate) - 1) / (1j * rate)
+    assert abs(reckoned(tables(log, settings)) - (1 + 2j + driven + 4j)) < 1e-9
