@@ -227,8 +227,7 @@ class FilterFor final : public AnyFilter<Scalar> {
 
   Report<Scalar> update(const Scalar* z, const std::shared_ptr<const AnySensor<Scalar>>& sensor,
                         const Scalar* place, Scalar age) override {
-    // Only what is remembered is owned: counting owners takes as long as a tenth of an update.
-    const Sensor there = late() ? placed(sensor, place) : placed(borrowed(*sensor), place);
+    const Sensor there = placed(sensor, place);
     const typename Sensor::Measurement value = to_measurement(z, *sensor);
     Robust& robust = filter_;
     if (age > oldest()) return Report<Scalar>(Status::kTimeBackwards);
@@ -485,13 +484,12 @@ class FilterFor final : public AnyFilter<Scalar> {
     const Scalar* place = record.place != nullptr ? record.place + k * kMaxPlace : nullptr;
     return place != nullptr && math::is_nan(place[0]) ? nullptr : place;
   }
-  static std::shared_ptr<const AnySensor<Scalar>> borrowed(const AnySensor<Scalar>& sensor) {
-    return std::shared_ptr<const AnySensor<Scalar>>(std::shared_ptr<void>(), &sensor);
-  }
-  static Sensor placed(const std::shared_ptr<const AnySensor<Scalar>>& sensor,
-                       const Scalar* place) {
+  Sensor placed(const std::shared_ptr<const AnySensor<Scalar>>& sensor, const Scalar* place) const {
+    const auto& model = static_cast<const SensorFor<Scalar, N>&>(*sensor);
+    // Only what is remembered is owned: counting owners takes as long as a tenth of an update.
+    const auto owner = late() ? sensor : std::shared_ptr<const AnySensor<Scalar>>();
     Sensor there;
-    there.model = std::static_pointer_cast<const SensorFor<Scalar, N>>(sensor);
+    there.model = std::shared_ptr<const SensorFor<Scalar, N>>(owner, &model);
     there.moved = place != nullptr;
     for (int i = 0; there.moved && i < sensor->place; ++i) there.place[i] = place[i];
     return there;

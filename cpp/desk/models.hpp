@@ -98,8 +98,8 @@ struct RuntimeProcess {
 /// from the variances `before`, to what the format resolves. Those are of a covariance that
 /// rounding has left indefinite or with a variance of 0, in single precision by a measurement that
 /// is 1e7 times as precise as what it corrects. False where that is none either: not finite. No bit
-/// of a belief that restore() takes changes, nor of one so small that all that is lost is
-/// subnormal.
+/// of a belief that restore() takes changes, nor of one so small that all that is lost, and no
+/// variance whole, is subnormal.
 template <class Filter>
 AUVEST_COLD bool mend_belief(const typename Filter::State& before,
                              typename Filter::BeliefType& belief) {
@@ -109,7 +109,8 @@ AUVEST_COLD bool mend_belief(const typename Filter::State& before,
   bool subnormal = true;
   for (int i = 0; i < Filter::kStates; ++i) {
     const Scalar floor = math::pivot_floor(before(i));
-    subnormal = subnormal && floor < (std::numeric_limits<Scalar>::min)();
+    subnormal =
+        subnormal && floor < (std::numeric_limits<Scalar>::min)() && belief.P(i, i) > Scalar(0);
     raised(i, i) = math::larger(raised(i, i), floor);
   }
   if (subnormal) return true;

@@ -220,6 +220,19 @@ def test_a_measurement_finer_than_the_format_leaves_a_covariance(kind, options):
     assert f.P[0, 0] < 0.1**2 * 44**2
 
 
+def test_a_variance_that_is_lost_among_others_near_the_smallest_number_is_no_0():
+    """A heading without noise of its own: its 1e-300 is lost, and its floor is subnormal."""
+    f = auvest.Ukf(
+        [-0.8216, -0.08508, -0.0749, 0.7808, 0.4466, 0.07459, 0.7752, 0.202],
+        np.eye(8) * 1e-300,
+        process=auvest.PlanarHull(surge_psd=1.469, current_psd=1.436e-05),
+        sensors=auvest.LeaderRange(),
+    )
+    f.predict(1.033, [-1.087, -0.6333])
+    assert (np.diagonal(f.P) > 0).all()
+    f.restore(f.save())
+
+
 def test_a_variance_beside_one_that_is_nothing_is_no_0():
     f = auvest.Ckf(
         [0.7, -0.2],

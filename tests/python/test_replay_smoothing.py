@@ -261,3 +261,21 @@ def test_the_recordings_are_smoothed_to_these(
     smoothed = np.mean([numbers["smoothed"]["rmse_m"] for numbers in found])
     assert smoothed <= most_m
     assert smoothed < np.mean([numbers["rmse_m"] for numbers in found])
+
+
+@needs_data
+def test_a_real_log_with_a_displaced_start_is_put_right_from_there(tmp_path: Path) -> None:
+    """32 m off, with a sigma of 2 m: the filter needs its recovery, the smoother knows before."""
+    (log,) = IMPORTERS["goats14"](Path(str(DATA)) / "goats14", tmp_path)
+    time_s, x, y, heading = pa_csv.read_csv(log / "start.csv").to_pydict().values()
+    write_file(
+        log, "start.csv", time_s=time_s, x_m=[x[0] + 25.0], y_m=[y[0] - 20.0], heading_rad=heading
+    )
+    result = replay(LogFolder(log), find_settings("goats14"), smooth=True, causes=False)
+    errors = result.errors.columns()
+    off = np.hypot(errors["error_x_m"], errors["error_y_m"])
+    smoothed = np.hypot(errors["smoothed_error_x_m"], errors["smoothed_error_y_m"])
+    assert off[0] > 30
+    assert result.numbers["recovered"] > 0
+    assert smoothed.max() < 3
+    assert result.numbers["smoothed"]["rmse_m"] < 0.75
