@@ -37,7 +37,7 @@ def html(*results: Result) -> str:
         ),
         warnings="\n".join(
             f'<p class="warning">{escape(f"{title}: {text}" if title else text)}</p>'
-            for title, found in by_filter(titles, [warnings(one) for one in results])
+            for title, found in by_filter(titles, [_beside_verdict(one) for one in results])
             for text in found
         ),
         numbers=columns_table(names, [rows(one) for one in results]),
@@ -82,6 +82,11 @@ def _verdict(result: Result, title: str) -> str:
         f'<p>{who}<span class="verdict {health.verdict}">{escape(words)}</span>'
         f"{escape(health.reason)}.</p>"
     )
+
+
+def _beside_verdict(result: Result) -> list[str]:
+    """Give the warnings without the one that the verdict has said."""
+    return [text for text in warnings(result) if not text.endswith(f": {result.health.reason}.")]
 
 
 def _health(result: Result) -> str:
