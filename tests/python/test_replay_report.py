@@ -366,3 +366,10 @@ def test_every_sensor_has_plots_of_its_own(tmp_path: Path) -> None:
     assert [name for name in charts if name.startswith("innovation")] == [
         "innovation-range-3-0", "innovation-fix-0-0", "innovation-fix-0-1",
     ]  # fmt: skip
+
+
+def test_a_log_of_one_fix_has_a_window_of_time(tmp_path: Path) -> None:
+    write_file(tmp_path, "fixes.csv", time_s=[5.0], source=[0], range_m=[9.0], bearing_rad=[0.0])
+    write_file(tmp_path, "beacons.csv", source=[0], x_m=[0.0], y_m=[0.0])
+    made = drawing.document([run_replay(LogFolder(tmp_path), Settings(), causes=False)])
+    assert made["to_s"] > made["from_s"]

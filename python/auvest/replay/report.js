@@ -208,6 +208,7 @@ class Chart {
     const caption = document.createElement("figcaption"), title = document.createElement("span");
     title.textContent = this.title;
     this.said = document.createElement("output");
+    this.said.setAttribute("aria-live", "off");  // the slider says what the reader has moved
     caption.append(title, this.said);
     const holder = document.createElement("div");
     holder.className = "plot";

@@ -94,7 +94,7 @@ def _health(result: Result) -> str:
         *sources(result.health),
         ("not to be trusted", untrusted(result.health) or "nothing"),
     ]
-    return f'<div class="scroll" id="sources">{_table(lines)}</div>'
+    return f'<div class="scroll words">{_table(lines)}</div>'
 
 
 def _settings(result: Result) -> list[tuple[str, str]]:
@@ -102,7 +102,7 @@ def _settings(result: Result) -> list[tuple[str, str]]:
         (f"[{section}] {key}", str(value))
         for section, values in result.document()["settings"].items()
         for key, value in values.items()
-        if value is not None
+        if value not in (None, {})
     ]
 
 
