@@ -299,3 +299,77 @@ def test_what_is_left_out_of_the_plots_is_said(
     assert len(thin.columns()["time_s"]) == 20
     said = report.thinned([result, replace(result, errors=thin)])
     assert said == "Drawn: one row in 2 of errors; the tables have all."
+
+
+def test_a_smoothed_track_is_drawn_beside_the_filters(
+    walked: tuple[Result, str, dict[str, Any]], tmp_path: Path
+) -> None:
+    """Its columns stand behind those of the estimates and errors, where a replay has them."""
+    result = walked[0]
+
+    def with_smoothed(samples: Samples, **columns: Any) -> Samples:
+        made = Samples((*samples.columns(), *columns))
+        made.add({**samples.columns(), **columns})
+        return made
+
+    estimates, errors = result.estimates.columns(), result.errors.columns()
+    names = ("heading_rad", "cov_xy_m2", "var_x_m2", "var_y_m2")
+    smoothed = replace(
+        result,
+        estimates=with_smoothed(
+            result.estimates,
+            smoothed_x_m=estimates["time_s"],
+            smoothed_y_m=0 * estimates["time_s"] + 2.0,
+            **{f"smoothed_{name}": 0.25 * estimates[name] for name in names},
+        ),
+        errors=with_smoothed(
+            result.errors,
+            smoothed_error_x_m=0 * errors["time_s"],
+            smoothed_error_y_m=0 * errors["time_s"] + 2.0,
+            smoothed_sigma_x_m=0.5 * errors["sigma_x_m"],
+            smoothed_sigma_y_m=0.5 * errors["sigma_y_m"],
+        ),
+    )
+    steps = 'await step("slid", () => slide(20)); await step("hovered", () => hover(30, 2));'
+    found = opened(report.html(smoothed), tmp_path, steps)
+    assert found["trouble"] == []
+    seen = found["seen"]["slid"]
+    assert seen["map"]["at"][1] == pytest.approx([20, 2], abs=1e-6)
+    assert seen["charts"]["error-y"]["values"][1] == pytest.approx(2.0)
+    ours, theirs = seen["charts"]["sigma"]["values"]
+    assert theirs == pytest.approx(0.5 * ours, rel=1e-5)
+    assert len(seen["charts"]["nis"]["values"]) == 1
+    assert found["seen"]["hovered"]["tip"].startswith(
+        "30.0 s  robust EKF, smoothed\nx 30.00 m, y 2.000 m"
+    )
+
+
+def test_every_sensor_has_plots_of_its_own(tmp_path: Path) -> None:
+    """Ranges and fixes in one log: a plot for each number, and the NIS over limits of their own."""
+    time_s = 1.0 * np.arange(1, 21)
+    write_file(
+        tmp_path, "odometry.csv", time_s=time_s, speed_m_s=0 * time_s + 1,
+        yaw_rate_rad_s=0 * time_s,
+    )  # fmt: skip
+    write_file(tmp_path, "fixes.csv", time_s=time_s, source=[0] * 20, range_m=9 + time_s,
+               bearing_rad=0 * time_s)  # fmt: skip
+    write_file(tmp_path, "ranges.csv", time_s=time_s[::2], source=[3] * 10,
+               range_m=30 - time_s[::2])  # fmt: skip
+    write_file(tmp_path, "beacons.csv", source=[0, 3], x_m=[-9.0, 30.0], y_m=[0.0, 0.0])
+    write_file(tmp_path, "start.csv", time_s=[0.0], x_m=[0.0], y_m=[0.0], heading_rad=[0.0])
+    result = run_replay(LogFolder(tmp_path), Settings(), causes=False)
+    made = drawing.document([result])
+    assert made["nis_95"] is None
+    found = opened(report.html(result), tmp_path, 'await step("opened", () => {});')
+    assert found["trouble"] == []
+    charts = found["seen"]["opened"]["charts"]
+    assert [name for name in charts if name.startswith("innovation")] == [
+        "innovation-range-3-0", "innovation-fix-0-0", "innovation-fix-0-1",
+    ]  # fmt: skip
+
+
+def test_a_log_of_one_fix_has_a_window_of_time(tmp_path: Path) -> None:
+    write_file(tmp_path, "fixes.csv", time_s=[5.0], source=[0], range_m=[9.0], bearing_rad=[0.0])
+    write_file(tmp_path, "beacons.csv", source=[0], x_m=[0.0], y_m=[0.0])
+    made = drawing.document([run_replay(LogFolder(tmp_path), Settings(), causes=False)])
+    assert made["to_s"] > made["from_s"]

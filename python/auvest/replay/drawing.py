@@ -40,7 +40,7 @@ def document(results: Sequence[Result]) -> dict[str, Any]:
     known = [time for time in times if np.isfinite(time)] or [0.0]
     return {
         "from_s": min(known),
-        "to_s": max(known),
+        "to_s": max(*known, min(known) + 1e-3),  # a window of some width even of one estimate
         "outcomes": list(tables.OUTCOMES),
         "sensors": [
             {
@@ -53,7 +53,7 @@ def document(results: Sequence[Result]) -> dict[str, Any]:
         "nis_95": limit,
         "looks": {
             "beacon": {"colour": plots.BLACK},
-            "leader": {"colour": plots.GREY, "dashes": [1, 3]},
+            "leader": {"colour": plots.GREY, "dashes": [8, 4], "width": 1},
         },
         "tracks": [track for one in results for track in _tracks(one, shares=limit is None)],
         "lines": _lines(first),

@@ -141,6 +141,7 @@ class Canvas {
     this.under = document.createElement("canvas");
     this.over = document.createElement("canvas");
     this.over.className = "over";
+    this.under.setAttribute("aria-hidden", "true");
     this.over.tabIndex = 0;
     this.over.setAttribute("role", "img");
     holder.append(this.under, this.over);
@@ -207,6 +208,7 @@ class Chart {
     const caption = document.createElement("figcaption"), title = document.createElement("span");
     title.textContent = this.title;
     this.said = document.createElement("output");
+    this.said.setAttribute("aria-live", "off");  // the slider says what the reader has moved
     caption.append(title, this.said);
     const holder = document.createElement("div");
     holder.className = "plot";
@@ -509,7 +511,7 @@ class Plane {
     if (this.fitted) this.fit();
     const pen = this.canvas.begin(this.canvas.under), { width, height } = this.canvas;
     this.drawGrid(pen, width, height);
-    for (const { points } of leaders) this.path(pen, points, data.looks.leader, 0.8, 0, points.time_s.length);
+    for (const { points } of leaders) this.path(pen, points, data.looks.leader, 0.5, 0, points.time_s.length);
     for (const line of lines) if (shown(line.key)) this.windowed(pen, line.points, line);
     for (const track of drawn()) if (shown("doubted")) this.drawRanges(pen, track);
     for (const track of drawn()) {
@@ -612,12 +614,12 @@ class Plane {
     if (!d) return;
     const a = firstFrom(d.time_s, state.from), b = firstFrom(d.time_s, state.to + 1e-9);
     pen.lineWidth = 1;
-    const line = Math.min(0.5, Math.max(0.05, 30 / (b - a))), end = Math.min(1, Math.max(0.25, 200 / (b - a)));
+    const line = Math.min(0.85, Math.max(0.05, 40 / (b - a))), end = Math.min(1, Math.max(0.25, 200 / (b - a)));
     for (let k = a; k < b; ++k) {
       const [x, y] = this.end(d, k);
       if (!Number.isFinite(x + y)) continue;
       const rejected = d.outcome[k] === REJECTED;
-      pen.strokeStyle = track.colour; pen.setLineDash(rejected ? [] : [1, 3]); pen.globalAlpha = line;
+      pen.strokeStyle = track.colour; pen.setLineDash(rejected ? [] : [2, 3]); pen.globalAlpha = line;
       pen.beginPath(); pen.moveTo(this.px(d.place_x_m[k]), this.py(d.place_y_m[k])); pen.lineTo(this.px(d.x_m[k]), this.py(d.y_m[k])); pen.lineTo(x, y); pen.stroke();
       pen.setLineDash([]); pen.globalAlpha = end;
       mark(pen, OUTCOME_MARKS[d.outcome[k]] ?? "dot", x, y, 3.5);
@@ -798,6 +800,7 @@ function measurementCharts() {
 // A short piece of the line, for legends.
 function sample({ colour, dashes, shape }) {
   const canvas = document.createElement("canvas"), pen = canvas.getContext("2d");
+  canvas.setAttribute("aria-hidden", "true");
   canvas.className = "sample"; canvas.width = 72; canvas.height = 24;
   pen.setTransform(2, 0, 0, 2, 0, 0);
   pen.strokeStyle = pen.fillStyle = colour; pen.lineWidth = shape ? 1.4 : 2.2;

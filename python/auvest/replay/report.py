@@ -37,7 +37,7 @@ def html(*results: Result) -> str:
         ),
         warnings="\n".join(
             f'<p class="warning">{escape(f"{title}: {text}" if title else text)}</p>'
-            for title, found in by_filter(titles, [warnings(one) for one in results])
+            for title, found in by_filter(titles, [_beside_verdict(one) for one in results])
             for text in found
         ),
         numbers=columns_table(names, [rows(one) for one in results]),
@@ -84,12 +84,17 @@ def _verdict(result: Result, title: str) -> str:
     )
 
 
+def _beside_verdict(result: Result) -> list[str]:
+    """Give the warnings without the one that the verdict has said."""
+    return [text for text in warnings(result) if not text.endswith(f": {result.health.reason}.")]
+
+
 def _health(result: Result) -> str:
     lines = [
         *sources(result.health),
         ("not to be trusted", untrusted(result.health) or "nothing"),
     ]
-    return f'<div class="scroll" id="sources">{_table(lines)}</div>'
+    return f'<div class="scroll words">{_table(lines)}</div>'
 
 
 def _settings(result: Result) -> list[tuple[str, str]]:
@@ -97,7 +102,7 @@ def _settings(result: Result) -> list[tuple[str, str]]:
         (f"[{section}] {key}", str(value))
         for section, values in result.document()["settings"].items()
         for key, value in values.items()
-        if value is not None
+        if value not in (None, {})
     ]
 
 
