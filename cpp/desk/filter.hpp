@@ -222,7 +222,10 @@ class FilterFor final : public AnyFilter<Scalar> {
   Report<Scalar> update(const Scalar* z, const std::shared_ptr<const AnySensor<Scalar>>& sensor,
                         const Scalar* place, Scalar age) override {
     Sensor placed;
-    placed.model = std::static_pointer_cast<const SensorFor<Scalar, N>>(sensor);
+    const auto& model = static_cast<const SensorFor<Scalar, N>&>(*sensor);
+    // Only what is remembered is owned: counting owners takes as long as a tenth of an update.
+    const auto owner = late() ? sensor : std::shared_ptr<const AnySensor<Scalar>>();
+    placed.model = std::shared_ptr<const SensorFor<Scalar, N>>(owner, &model);
     placed.moved = place != nullptr;
     if (placed.moved) {
       for (int i = 0; i < sensor->place; ++i) placed.place[i] = place[i];
@@ -248,10 +251,11 @@ class FilterFor final : public AnyFilter<Scalar> {
   std::size_t run(const Record<Scalar>& record, const Columns<Scalar>& out, Report<Scalar>& last,
                   Status& status) override {
     status = Status::kOk;
+    Robust before = filter_;
+    std::optional<Memory> remembered;
     for (std::size_t k = 0; k < record.rows; ++k) {
-      const Robust before = filter_;
-      const std::optional<Memory> remembered =
-          late() ? std::optional<Memory>(memory_) : std::nullopt;
+      before = filter_;
+      if (late()) remembered = memory_;
       Report<Scalar> report;
       bool too_late = false;
       status = take(record, k, report, too_late);

@@ -22,6 +22,7 @@
 #include "auvest/slat/definite.hpp"
 #include "desk/members.hpp"
 #include "desk/report.hpp"
+#include "desk/well_conditioned.hpp"
 
 namespace auvest {
 namespace desk {
@@ -87,19 +88,21 @@ struct RuntimeProcess {
   int position_states() const { return model->position_states; }
 };
 
-/// After a step of `Filter` from the belief `before`: what restore() does not take has its lost
-/// pivots raised to what the format resolves. Those are of a covariance that rounding has left
-/// indefinite or with a variance of 0, in single precision by a measurement that is 1e7 times as
-/// precise as what it corrects. False where that is none either: not finite. No bit of a belief
-/// that restore() takes changes, nor of one so small that all that is lost is subnormal.
+/// Raises the lost pivots of a covariance that restore() does not take, after a step of `Filter`
+/// from the variances `before`, to what the format resolves. Those are of a covariance that
+/// rounding has left indefinite or with a variance of 0, in single precision by a measurement that
+/// is 1e7 times as precise as what it corrects. False where that is none either: not finite. No bit
+/// of a belief that restore() takes changes, nor of one so small that all that is lost is
+/// subnormal.
 template <class Filter>
-bool keep_belief(const typename Filter::BeliefType& before, typename Filter::BeliefType& belief) {
+AUVEST_COLD bool mend_belief(const typename Filter::State& before,
+                             typename Filter::BeliefType& belief) {
   using Scalar = typename Filter::Scalar;
   if (Filter::check_belief(belief) == Status::kOk) return true;
   typename Filter::Covariance raised = belief.P;
   bool subnormal = true;
   for (int i = 0; i < Filter::kStates; ++i) {
-    const Scalar floor = math::pivot_floor(before.P(i, i));
+    const Scalar floor = math::pivot_floor(before(i));
     subnormal = subnormal && floor < (std::numeric_limits<Scalar>::min)();
     raised(i, i) = math::larger(raised(i, i), floor);
   }
@@ -122,10 +125,9 @@ class RuntimeGaussian
       : Base(process, how.check()), how_(how) {}
 
   Status predict_belief(BeliefType& belief, Scalar dt) const {
-    const BeliefType before = belief;
+    const typename Base::State before = belief.P.diagonal();
     const Status status = this->process().model->predict(how_, belief, dt, this->process().input);
-    if (status != Status::kOk) return status;
-    return keep_belief<RuntimeGaussian>(before, belief) ? Status::kOk : Status::kOverflow;
+    return status != Status::kOk || keeps(before, belief) ? status : Status::kOverflow;
   }
 
   template <class Model, class Point>
@@ -148,13 +150,18 @@ class RuntimeGaussian
     const BeliefType before = belief;
     const std::decay_t<Rule> as_it_was = rule;
     const Status status = Base::correct(z, model, rule, correction);
-    if (status != Status::kOk || keep_belief<RuntimeGaussian>(before, belief)) return status;
+    if (status != Status::kOk || keeps(before.P.diagonal(), belief)) return status;
     belief = before;
     rule = as_it_was;
     return Status::kOverflow;
   }
 
  private:
+  static bool keeps(const typename Base::State& variances_before, BeliefType& belief) {
+    return (is_well_conditioned(belief.P) && math::all_finite(belief.x)) ||
+           mend_belief<RuntimeGaussian>(variances_before, belief);
+  }
+
   AnyLinearisation<Scalar> how_;
 };
 

@@ -1,0 +1,103 @@
+// The quick question of the desk against the elimination of the core, which decides.
+#include "desk/well_conditioned.hpp"
+
+#include <limits>
+
+#include "auvest/math/random.hpp"
+#include "doctest/doctest.h"
+
+namespace {
+
+using auvest::Matrix;
+using auvest::desk::is_well_conditioned;
+
+/// L D L' with a unit lower triangular L of numbers about `slope` and the pivots `d`.
+template <class Scalar, int N>
+Matrix<Scalar, N, N> product(const double (&d)[N], double slope, auvest::math::Random& random) {
+  double l[N][N];
+  for (int i = 0; i < N; ++i) {
+    for (int j = 0; j < i; ++j) l[i][j] = slope * random.normal<double>();
+    l[i][i] = 1;
+  }
+  Matrix<Scalar, N, N> p;
+  for (int i = 0; i < N; ++i) {
+    for (int j = 0; j < N; ++j) {
+      double sum = 0;
+      for (int k = 0; k < N && k <= i && k <= j; ++k) sum += l[i][k] * d[k] * l[j][k];
+      p(i, j) = static_cast<Scalar>(sum);
+    }
+  }
+  return p;
+}
+
+/// Of what is well conditioned the core loses no pivot. A pivot of less than 16 times the rounding
+/// noise of its diagonal is never taken for more than noise, and one of more than 300 times always.
+template <class Scalar, int N>
+void compare(double unit) {
+  auvest::math::Random random(N);
+  const double noise = static_cast<double>(std::numeric_limits<Scalar>::epsilon());
+  int quick = 0;
+  for (int round = 0; round < 300; ++round) {
+    for (int lost = 0; lost < N; ++lost) {
+      for (double share : {1000., 100., 10., 1., 0., -1., -10., -1e6}) {
+        double d[N];
+        for (double& pivot : d) pivot = unit;
+        d[lost] = share * noise * unit;
+        // The diagonal is about `unit` whatever the pivot: rows above the lost one reach it.
+        const Matrix<Scalar, N, N> p = product<Scalar, N>(d, lost == 0 ? 0 : 0.7, random);
+        const double ratio = d[lost] / static_cast<double>(p(lost, lost));
+        const bool well = is_well_conditioned(p);
+        CAPTURE(lost);
+        CAPTURE(share);
+        if (well) CHECK(auvest::math::is_positive_definite(p));
+        if (share <= 0 || ratio < 16 * noise) CHECK_FALSE(well);
+        quick += well ? 1 : 0;
+        if (lost > 0 && share > 0 && ratio > 300 * noise) CHECK(well);
+      }
+    }
+  }
+  CHECK(quick > 0);
+}
+
+}  // namespace
+
+TEST_CASE(
+    "what is well conditioned loses no pivot, and what has lost one is not well conditioned") {
+  for (double unit : {1., 1e-4, 1e4}) {
+    compare<double, 2>(unit);
+    compare<double, 3>(unit);
+    compare<double, 6>(unit);
+    compare<float, 3>(unit);
+    compare<float, 6>(unit);
+  }
+}
+
+TEST_CASE(
+    "a diagonal is well conditioned up to the factors that the format holds, and no further") {
+  Matrix<double, 6, 6> p = Matrix<double, 6, 6>::Zero();
+  for (int i = 0; i < 6; ++i) p(i, i) = 1e-6 * (i + 1);
+  CHECK(is_well_conditioned(p));
+  for (int i = 0; i < 6; ++i) p(i, i) = 1e6 * (i + 1);
+  CHECK(is_well_conditioned(p));
+  // 31 factors come to the last pivot, which is 1e315 then, and 1e-300 with 1e-314 for its noise.
+  for (int i = 0; i < 6; ++i) p(i, i) = 7e9;
+  CHECK_FALSE(is_well_conditioned(p));
+  for (int i = 0; i < 6; ++i) p(i, i) = 4.2e-10;
+  CHECK_FALSE(is_well_conditioned(p));
+}
+
+TEST_CASE("what is not finite is not well conditioned, wherever it stands") {
+  const float values[] = {std::numeric_limits<float>::quiet_NaN(),
+                          std::numeric_limits<float>::infinity(),
+                          -std::numeric_limits<float>::infinity(), 0.f};
+  for (float value : values) {
+    for (int i = 0; i < 4; ++i) {
+      for (int j = 0; j <= i; ++j) {
+        if (value == 0.f && i != j) continue;  // a covariance of 0 is fine
+        Matrix<float, 4, 4> p = Matrix<float, 4, 4>::Identity();
+        p(i, j) = value;
+        CHECK_FALSE(is_well_conditioned(p));
+      }
+    }
+  }
+}
