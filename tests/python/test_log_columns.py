@@ -498,6 +498,7 @@ def test_latitudes_and_longitudes(tmp_path: Path) -> None:
                heading_rad=[0.0])  # fmt: skip
     folder = LogFolder(log)
     assert folder.frame.origin == (45.0, 7.0)
+    assert replay(folder, Settings(), causes=False).numbers["origin_deg"] == [45.0, 7.0]
     places = folder.beacons()
     assert places[3] == pytest.approx((0.0, 111.131745), abs=1e-3)
     assert places[4] == pytest.approx((78.846806, 0.0), abs=1e-3)

@@ -185,6 +185,8 @@ def replay(
     if smooth:
         numbers["smoothed"] = {"lag_s": lag_s, **tally.smoothed()}
     numbers["origin_m"] = None if origin is None else list(origin)
+    earth = log.frame.origin
+    numbers["origin_deg"] = None if earth is None else list(earth)
     if residuals.convergence:
         settled_s = residuals.settled_s
         numbers["convergence"] = residuals.convergence
