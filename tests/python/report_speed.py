@@ -55,8 +55,17 @@ def long_log(folder: Path, hours: float) -> LogFolder:
     return LogFolder(folder)
 
 
+def opened(page: Path, folder: Path) -> tuple[float, float]:
+    """Open a page: when it was drawn, by its own clock, and how long the browser ran in all, s."""
+    begun = time.perf_counter()
+    shown, _ = dom_of(page.as_uri(), folder, wait=False)
+    drawn = re.search(r'data-drawn-ms="(\d+)"', shown)
+    assert drawn is not None
+    return int(drawn[1]) / 1000, time.perf_counter() - begun
+
+
 def main() -> None:
-    """Print a row for each length."""
+    """Print a row for each length; of opening the page the quickest of three."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--hours", type=float, nargs="+", default=[1.0, 24.0])
     hours = parser.parse_args().hours
@@ -70,15 +79,11 @@ def main() -> None:
             page = folder / "report.html"
             page.write_text(report.html(result), encoding="utf-8")
             made = time.process_time() - begun
-            begun = time.perf_counter()
-            shown, _ = dom_of(page.as_uri(), folder, wait=False)
-            whole = time.perf_counter() - begun
-            drawn = re.search(r'data-drawn-ms="(\d+)"', shown)
-            assert drawn is not None
+            drawn_s, whole_s = min(opened(page, folder) for _ in range(3))
             print(
                 f"| {length:g} h | {result.numbers['estimates']:,} | "
                 f"{page.stat().st_size / 1e6:.1f} MB | {made:.2f} s | "
-                f"{int(drawn[1]) / 1000:.2f} s | {whole:.1f} s |"
+                f"{drawn_s:.2f} s | {whole_s:.1f} s |"
             )
 
 

@@ -196,6 +196,8 @@ function mark(pen, kind, x, y, size = 4) {
 }
 // What was accepted has a shape for each filter, so that colours are not all that tells them apart.
 const SHAPES = ["dot", "square", "diamond", "plus"];
+// More marks than this are drawn simply, and not all lines of ranges: they would be one area.
+const MANY = 1500;
 const OUTCOME_MARKS = { [REJECTED]: "cross", [DOWN]: "ring" };
 
 // ---- the plots over time ----
@@ -349,10 +351,15 @@ class Chart {
 
   drawPoints(pen, one, a, b) {
     pen.strokeStyle = pen.fillStyle = one.colour; pen.lineWidth = 1.3;
+    const dense = b - a > MANY;
     for (let k = a; k < b; ++k) {
       const v = one.values[k];
       if (!Number.isFinite(v)) continue;
       const x = this.x(one.time[k]);
+      if (dense && !OUTCOME_MARKS[one.outcome[k]] && v >= this.low && v <= this.high) {
+        pen.fillRect(x - 1, this.y(v) - 1, 2, 2);
+        continue;
+      }
       if (v > this.high) mark(pen, "up", x, this.top + 2);
       else if (v < this.low) mark(pen, "down", x, this.bottom - 2);
       else mark(pen, OUTCOME_MARKS[one.outcome?.[k]] ?? SHAPES[one.place % SHAPES.length], x, this.y(v), OUTCOME_MARKS[one.outcome?.[k]] ? 3.5 : 3);
@@ -614,13 +621,17 @@ class Plane {
     if (!d) return;
     const a = firstFrom(d.time_s, state.from), b = firstFrom(d.time_s, state.to + 1e-9);
     pen.lineWidth = 1;
+    const every = Math.ceil((b - a) / MANY);
     const line = Math.min(0.85, Math.max(0.05, 40 / (b - a))), end = Math.min(1, Math.max(0.25, 200 / (b - a)));
     for (let k = a; k < b; ++k) {
       const [x, y] = this.end(d, k);
       if (!Number.isFinite(x + y)) continue;
-      const rejected = d.outcome[k] === REJECTED;
-      pen.strokeStyle = track.colour; pen.setLineDash(rejected ? [] : [2, 3]); pen.globalAlpha = line;
-      pen.beginPath(); pen.moveTo(this.px(d.place_x_m[k]), this.py(d.place_y_m[k])); pen.lineTo(this.px(d.x_m[k]), this.py(d.y_m[k])); pen.lineTo(x, y); pen.stroke();
+      pen.strokeStyle = track.colour;
+      if ((k - a) % every === 0) {
+        pen.setLineDash(d.outcome[k] === REJECTED ? [] : [2, 3]);
+        pen.globalAlpha = line;
+        pen.beginPath(); pen.moveTo(this.px(d.place_x_m[k]), this.py(d.place_y_m[k])); pen.lineTo(this.px(d.x_m[k]), this.py(d.y_m[k])); pen.lineTo(x, y); pen.stroke();
+      }
       pen.setLineDash([]); pen.globalAlpha = end;
       mark(pen, OUTCOME_MARKS[d.outcome[k]] ?? "dot", x, y, 3.5);
     }
