@@ -142,14 +142,14 @@ def test_distance_and_turn(tmp_path: Path) -> None:
 def test_a_compass_of_its_own_rate(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, increments: bool, lines: int
 ) -> None:
-    """A DVL at 1 Hz, a compass at 3 Hz that begins before it and passes through +-pi."""
+    """A DVL at 1 Hz, a compass at 2.5 Hz that begins before it; at 3 s it is about to pass pi."""
     monkeypatch.setattr(reader, "CHUNK_LINES", lines)
     log = ranging(tmp_path, until_s=10.0)
     found = arc_lines("increments" if increments else "heading")
     del found["heading_rad"]
     write_file(log, "odometry.csv", **found)
-    time = np.arange(-1, 31) / 3.0
-    heading = np.pi - 0.3 + ARC_RATE * time  # of a compass that is off by pi - 0.3
+    time = 0.4 * np.arange(-1, 26)
+    heading = np.pi - 0.5 + ARC_RATE * time  # of a compass that is off by pi - 0.5
     write_file(log, "compass.csv", time_s=time, heading_rad=np.angle(np.exp(1j * heading)))
     assert abs(reckoned(tables(log)) - ARC_END) < 1e-9
 
@@ -498,6 +498,7 @@ def test_latitudes_and_longitudes(tmp_path: Path) -> None:
                heading_rad=[0.0])  # fmt: skip
     folder = LogFolder(log)
     assert folder.frame.origin == (45.0, 7.0)
+    assert replay(folder, Settings(), causes=False).numbers["origin_deg"] == [45.0, 7.0]
     places = folder.beacons()
     assert places[3] == pytest.approx((0.0, 111.131745), abs=1e-3)
     assert places[4] == pytest.approx((78.846806, 0.0), abs=1e-3)
@@ -514,3 +515,14 @@ def test_metres_and_degrees_need_an_origin(tmp_path: Path) -> None:
                heading_rad=[0.0])  # fmt: skip
     with pytest.raises(LogError, match=r"Say so in origin\.csv"):
         LogFolder(log)
+
+
+def test_the_heading_goes_on_in_a_gap_of_the_velocity(tmp_path: Path) -> None:
+    """A quarter turn in 20 s, of which the first 4 are driven at 1 m/s; then 4 m along +y."""
+    log = ranging(tmp_path, until_s=30.0)
+    write_file(log, "odometry.csv", time_s=[0.0, 20.0], speed_m_s=[1.0, 1.0],
+               heading_rad=[0.0, QUARTER])  # fmt: skip
+    settings = settings_from({"odometry": {"gap_s": 4.0}})
+    rate = QUARTER / 20
+    driven = (np.exp(4j * rate) - 1) / (1j * rate)
+    assert abs(reckoned(tables(log, settings)) - (1 + 2j + driven + 4j)) < 1e-9

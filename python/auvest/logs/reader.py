@@ -289,6 +289,7 @@ class CsvTable:
         for name in names:
             stem, _, unit = name.partition("_")
             meant = [other for other in sorted(known) if other.split("_")[0] == stem]
+            meant.sort(key=lambda other: "_" not in other)  # a name with a unit before one without
             wrong = found is None or (stem not in stems and unit in _OTHER_UNITS)
             if name not in known and meant and wrong and name not in self._mapped():
                 raise LogError(

@@ -48,6 +48,8 @@ from auvest.replay.thinning import SAME_S, Thinning
 
 #: Velocity odometry is gone through in small steps: so many at once, so that memory stays bounded.
 _STEPS = 32768
+#: The columns that sources need, in the order in which they take them.
+_LEADERS = ("time_s", "source", "x_m", "y_m")
 #: Files of which a line that is too late makes all after it wrong.
 _REQUIRED = ("odometry.csv", "compass.csv", "leaders.csv")
 #: So many steps without a line in any file are no log any more.
@@ -162,8 +164,13 @@ class Replay(ABC):
 
     def _add_leaders(self, rows: Rows) -> None:
         table = self.log["leaders.csv"]
-        sigma = table.column(rows, "sigma_m", 0.0)
-        self._sources.add(np.column_stack([rows[:, :4], sigma]))
+        if table.names == _LEADERS:
+            self._sources.add(rows)
+        else:
+            sigma = table.column(rows, "sigma_m", 0.0)
+            self._sources.add(np.column_stack([rows[:, :4], sigma]))
+        if not self.instruments.needs_depths:
+            return
         depth = table.column(rows, "depth_m", 0.0)
         self.instruments.source_depths.add(np.column_stack([rows[:, :2], depth, 0 * depth]))
 

@@ -66,7 +66,7 @@ def _innovation(axes: Axes, result: Result, m: int) -> None:
     rows, doubted = result.measurements.columns(), result.outliers.columns()
     # Near the station the innovation is a position error and has no place among these.
     known = ~np.isnan(rows[f"innovation_{m}"]) & (rows["near_field"] == 0)
-    ranged = np.isin(rows["sensor"], ("range", "fix"))
+    ranged = ~np.isin(rows["sensor"], ("position", "velocity", "depth"))
     known &= ranged if ranged.any() else rows["sensor"] == "position"
     time, bound = rows["time_s"][known], 3 * rows[f"sigma_{m}"][known]
     value = rows[f"innovation_{m}"][known]

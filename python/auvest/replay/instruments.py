@@ -178,6 +178,11 @@ class Instruments:
         self.late_s = max(latencies, default=0.0)
 
     @property
+    def needs_depths(self) -> bool:
+        """Whether the depths of the sources are asked for."""
+        return self._levelled or self._spatial
+
+    @property
     def sensors(self) -> list[int]:
         """Which sensors the log has."""
         of_file = {

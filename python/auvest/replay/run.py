@@ -158,6 +158,8 @@ def replay(
             interrupted = True
     numbers = tally.numbers()
     numbers["origin_m"] = None if origin is None else list(origin)
+    earth = log.frame.origin
+    numbers["origin_deg"] = None if earth is None else list(earth)
     if residuals.convergence:
         settled_s = residuals.settled_s
         numbers["convergence"] = residuals.convergence

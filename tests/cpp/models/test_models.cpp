@@ -1008,7 +1008,7 @@ TEST_CASE("odometry: increments compose") {
 TEST_CASE("odometry: the heading's noise grows with time and, where told, with the turn") {
   auvest::Odometry<double> model;
   model.input << 3, 1, -0.5;
-  CHECK(model.Q(4)(2, 2) == 1e-6 * 4);
+  CHECK(model.Q(4)(2, 2) == close_to(1e-6 * 4, 1e-20));
   model.params.sigma_turned = 0.1;
   // 10 % of half a rad, whichever way, and 0.001 rad/sqrt(s) for 4 s.
   CHECK(model.Q(4)(2, 2) == close_to(0.0025 + 1e-6 * 4, 1e-14));
