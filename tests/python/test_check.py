@@ -211,7 +211,7 @@ def test_replay_says_the_same_and_warns(tmp_path: Path) -> None:
     assert by_text[0] == by_text[1]
     assert all({"cause", "file", "line", "message"} <= set(one) for one in told["findings"])
     report = (tmp_path / "out" / "log" / "report.html").read_text(encoding="utf-8")
-    assert "<h2>Health: not trusted</h2>" in report
+    assert '<span class="verdict not_trusted">not trusted</span>' in report
 
 
 def test_moments_below_three_sigma() -> None:

@@ -353,19 +353,25 @@ def test_every_sensor_has_plots_of_its_own(tmp_path: Path) -> None:
     )  # fmt: skip
     write_file(tmp_path, "fixes.csv", time_s=time_s, source=[0] * 20, range_m=9 + time_s,
                bearing_rad=0 * time_s)  # fmt: skip
-    write_file(tmp_path, "ranges.csv", time_s=time_s[::2], source=[3] * 10,
-               range_m=30 - time_s[::2])  # fmt: skip
-    write_file(tmp_path, "beacons.csv", source=[0, 3], x_m=[-9.0, 30.0], y_m=[0.0, 0.0])
+    write_file(tmp_path, "ranges.csv", time_s=time_s[::2], source=[0] * 10,
+               range_m=9.5 + time_s[::2])  # fmt: skip
+    write_file(tmp_path, "beacons.csv", source=[0], x_m=[-9.0], y_m=[0.0])
     write_file(tmp_path, "start.csv", time_s=[0.0], x_m=[0.0], y_m=[0.0], heading_rad=[0.0])
     result = run_replay(LogFolder(tmp_path), Settings(), causes=False)
     made = drawing.document([result])
     assert made["nis_95"] is None
-    found = opened(report.html(result), tmp_path, 'await step("opened", () => {});')
+    found = opened(report.html(result), tmp_path, 'await step("end", () => slide(20));')
     assert found["trouble"] == []
-    charts = found["seen"]["opened"]["charts"]
+    charts = found["seen"]["end"]["charts"]
     assert [name for name in charts if name.startswith("innovation")] == [
-        "innovation-range-3-0", "innovation-fix-0-0", "innovation-fix-0-1",
+        "innovation-range-0-0", "innovation-fix-0-0", "innovation-fix-0-1",
     ]  # fmt: skip
+    # The last range is of 19 s, the last fix of 20 s.
+    rows = result.measurements.columns()
+    for name, time_s in (("range", 19.0), ("fix", 20.0)):
+        (k,) = np.flatnonzero((rows["sensor"] == name) & (rows["time_s"] == time_s))
+        value = charts[f"innovation-{name}-0-0"]["values"]
+        assert value == [pytest.approx(rows["innovation_0"][k], rel=1e-5)]
 
 
 def test_a_log_of_one_fix_has_a_window_of_time(tmp_path: Path) -> None:
