@@ -123,7 +123,7 @@ NUMBERS: dict[str, Any] = {
     "before_start": 5,
     "after_end": 6,
     "no_position": 7,
-    "too_short": 0,
+    "too_short": 3,
     "recovered": 8,
     "near_field": 9,
     "rmse_m": 0.12345,
