@@ -106,12 +106,15 @@ AUVEST_COLD bool mend_belief(const typename Filter::State& before,
   using Scalar = typename Filter::Scalar;
   if (Filter::check_belief(belief) == Status::kOk) return true;
   typename Filter::Covariance raised = belief.P;
+  const Scalar least = (std::numeric_limits<Scalar>::min)();
   bool subnormal = true;
   for (int i = 0; i < Filter::kStates; ++i) {
     const Scalar floor = math::pivot_floor(before(i));
-    subnormal =
-        subnormal && floor < (std::numeric_limits<Scalar>::min)() && belief.P(i, i) > Scalar(0);
+    const bool nothing = !(raised(i, i) > Scalar(0));
+    subnormal = subnormal && floor < least && !nothing;
     raised(i, i) = math::larger(raised(i, i), floor);
+    // Such that the rounding noise of it is a number.
+    if (nothing) raised(i, i) = math::larger(raised(i, i), least / math::pivot_floor(Scalar(4)));
   }
   if (subnormal) return true;
   belief.P = raised;

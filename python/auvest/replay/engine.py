@@ -814,7 +814,7 @@ def heading_of(states: Floats, covariance: Floats) -> tuple[Floats, Floats]:
 
 
 def course_of(states: Floats, covariance: Floats, velocity: int) -> tuple[Floats, Floats]:
-    """Courses and their standard deviations, rad; of one that stands they are not known.
+    """Courses and their standard deviations, rad: at most that of a course that may be any.
 
     ``velocity`` is the place of the first of its components in a state.
     """
@@ -822,10 +822,11 @@ def course_of(states: Floats, covariance: Floats, velocity: int) -> tuple[Floats
     vx, vy = states[:, x], states[:, y]
     square = vx * vx + vy * vy
     across = vy * vy * covariance[:, x, x] - 2 * vx * vy * covariance[:, x, y]
-    across = across + vx * vx * covariance[:, y, y]
-    variance = np.full(len(square), np.nan)
-    np.divide(across, square * square, out=variance, where=square > 0)
-    return np.arctan2(vy, vx), np.sqrt(np.maximum(variance, 0.0))
+    across = np.maximum(across + vx * vx * covariance[:, y, y], 0.0)
+    any_course = math.pi / math.sqrt(3)
+    sigma = np.full(len(square), any_course)
+    np.divide(np.sqrt(across), square, out=sigma, where=square > 0)
+    return np.arctan2(vy, vx), np.minimum(sigma, any_course)
 
 
 def coast(states: Floats, at: Floats, time_s: Rows, *, spatial: bool) -> Floats:
