@@ -58,8 +58,8 @@ over the same record, one thread; only the ratios travel to another machine.
 
 ## A record in one call
 
-One UKF step: predict and update, six states, range and bearing, alpha = 1e-3. After each of the two,
-auvest alone asks whether P is positive definite, and can take the row back.
+One UKF step: predict and update, six states, range and bearing, alpha = 1e-3. auvest alone asks
+after each of the two whether P is positive definite, and can take the row back.
 
 | filter | us per step | times the time of auvest, float64 |
 | --- | ---: | ---: |
