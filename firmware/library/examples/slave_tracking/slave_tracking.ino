@@ -19,9 +19,9 @@
 // the sample is taken at once and counted as late; the prediction covers the time that really
 // passed. A reading that does not come is replaced by the last one, an echo by nothing; both are
 // counted as missed. So is what cannot be (status kImpossibleRange or kImplausible), which is
-// counted as implausible. An echo beyond the filter's gate says nothing, has the status kImplausible
-// and is counted as gated; where several of them agree, it is the master that was lost, and it is
-// born again where they place it (rebirths).
+// counted as implausible. An echo beyond the filter's gate says nothing, has the status
+// kImplausible and is counted as gated; where several of them agree, it is the master that was
+// lost, and it is born again where they place it (rebirths).
 //
 // A loop that hangs for two seconds is ended by the watchdog, and the board starts anew.
 //
