@@ -32,12 +32,13 @@ class HeldInterrupts:
     def __init__(self) -> None:
         self._entered = 0
         self._pending = False
-        self._before: Callable[[int, FrameType | None], Any] | int | None = None
+        self._before: Callable[[int, FrameType | None], Any] | None = None
 
     def __enter__(self) -> Self:
         if not self._entered and threading.current_thread() is threading.main_thread():
-            self._before = signal.getsignal(signal.SIGINT)
-            if self._before is not None:
+            before = signal.getsignal(signal.SIGINT)
+            if callable(before):  # else it is ignored, as under nohup, or not Python's
+                self._before = before
                 signal.signal(signal.SIGINT, self._arrived)
         self._entered += 1
         return self
@@ -59,7 +60,7 @@ class HeldInterrupts:
     def _arrived(self, number: int, frame: FrameType | None) -> None:
         if self._entered > 1:
             self._pending = True
-        elif callable(self._before):
+        elif self._before is not None:
             self._before(number, frame)
 
 

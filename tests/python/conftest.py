@@ -1,5 +1,6 @@
 """What several test files share."""
 
+import signal
 import subprocess
 from pathlib import Path
 
@@ -12,6 +13,14 @@ ROOT = Path(__file__).resolve().parents[2]
 def root() -> Path:
     """Return the top of the source tree."""
     return ROOT
+
+
+@pytest.fixture
+def ctrl_c():
+    """Have Ctrl-C act as in a terminal: a parent may have had it ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 @pytest.fixture

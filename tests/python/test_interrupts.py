@@ -93,6 +93,7 @@ def test_an_echo_at_the_very_beginning_is_heard() -> None:
         assert after[name].tobytes() == at_once[name].tobytes(), name
 
 
+@pytest.mark.usefixtures("ctrl_c")
 @pytest.mark.parametrize(
     ("filter_", "run"),
     [
@@ -126,6 +127,7 @@ def test_ctrl_c_keeps_the_rows_and_the_filter_at_the_last(
     filter_.predict(0.1) if isinstance(filter_, Ukf) else filter_.predict(0.1, [1, 0])
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_does_not_wait_for_functions_of_python() -> None:
     calls = []
 

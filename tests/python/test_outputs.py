@@ -191,6 +191,7 @@ def test_a_file_takes_its_name_when_it_is_whole(tmp_path: Path) -> None:
     assert files(tmp_path) == {"t.csv": "old"}
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_waits_for_what_must_be_whole() -> None:
     done: list[int] = []
 
@@ -216,3 +217,14 @@ def test_ctrl_c_waits_for_what_must_be_whole() -> None:
         outside()  # of the inner block it acts at once
     assert done == [0]
     assert signal.getsignal(signal.SIGINT) is before
+
+
+@pytest.mark.usefixtures("ctrl_c")
+def test_ctrl_c_that_is_ignored_stays_so() -> None:
+    """As under nohup, or in the background of a script."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with HeldInterrupts() as held:
+        with held:
+            os.kill(os.getpid(), signal.SIGINT)
+        assert not held.take()
+    assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
