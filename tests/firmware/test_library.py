@@ -328,7 +328,7 @@ def test_keywords_are_the_types_that_a_sketch_names(keywords, folder):
     sketches = [*(folder / "examples").rglob("*.ino"), *(folder / "examples").rglob("*.h")]
     code = "".join(path.read_text() for path in sketches)
     named = set(re.findall(r"\bauvest::([A-Z]\w+)", code))
-    assert {"Aukf", "Vector", "Slatf2"} <= named <= types
+    assert {"Aukf", "Vector", "SlatfShared"} <= named <= types
     # One of each form: class, struct, enum class, using; and none of what is in a detail namespace.
     assert {"Ckf", "Hampel", "Decision", "RobustEkf", "Status"} <= types
     assert "DoubleTrigonometry" not in types

@@ -20,8 +20,10 @@ def asked_for(target: Target) -> bool:
 
 def target_params(targets):
     """Parameters of a test, one for each target."""
-    for target in targets:
-        yield pytest.param(target, id=target.name, marks=() if asked_for(target) else SLOW)
+    return [
+        pytest.param(target, id=target.name, marks=() if asked_for(target) else SLOW)
+        for target in targets
+    ]
 
 
 def differing_bits(a: np.ndarray, b: np.ndarray) -> int:
