@@ -86,9 +86,15 @@ class Replay(ABC):
     listener: Callable[[GaussianFilter, Rows, Mapping[str, Any]], None] | None = None
     #: Whether the state has a depth.
     spatial = False
-    _filter: GaussianFilter
     #: Gets the same, to go back over it.
     smoothing: Smoothing | None = None
+    _filter: GaussianFilter
+    #: The present and its state; and states before it that a late measurement may belong to.
+    _now: float
+    _x: Floats
+    _P: Floats
+    _past_s: Floats
+    _past_x: Floats
 
     def __init__(self, log: LogFolder, settings: Settings, filter_name: FilterName) -> None:
         log = _early(log, settings)
@@ -277,14 +283,20 @@ class Replay(ABC):
         return taken[taken <= limit]
 
     def _fused(
-        self, z: Rows, place: Rows, ages: Rows, measured: Measured, of_row: Rows, **rows: Rows
+        self, fused: Measured, bare: Rows, after: npt.NDArray[np.intp], **rows: Rows
     ) -> tuple[dict[str, npt.NDArray[Any]], list[RunResult]]:
         """Take rows through the filter: what updates reported, and results.
 
-        One call per stretch of one sensor with one noise; ``of_row`` says which measurement a row
-        has, -1 where none. A row without one goes with the next that has one.
+        ``bare`` are the times of rows without measurement, ``after`` says behind how many of them
+        each measurement has its row; ``rows`` are columns of all. One call per stretch of one
+        sensor with one noise; a row without a measurement goes with the next that has one.
         """
-        kinds = np.column_stack([measured.sensor, measured.noise])
+        nothing = np.full((len(bare), 3), np.nan)
+        z = np.insert(nothing, after, fused.z, axis=0)
+        place = np.insert(nothing, after, fused.place, axis=0)
+        ages = np.insert(np.zeros(len(bare)), after, fused.time_s - fused.taken_s)
+        of_row = np.insert(np.full(len(bare), -1), after, np.arange(len(fused)))
+        kinds = np.column_stack([fused.sensor, fused.noise])
         models, model_of = _distinct(kinds)
         there = np.flatnonzero(of_row >= 0)
         if len(there):
@@ -308,6 +320,15 @@ class Replay(ABC):
             numbers = z[part, : len(sensor.measures)]
             results.append(self._run_rows(self._filter, numbers, sensor=sensor, **options))
         return updates_of(results), results
+
+    def _move_on(self, at: Rows, states: Floats, spreads: Floats) -> None:
+        """Make the last of these states the present; remember what a latency may still ask for."""
+        self._now, self._x, self._P = float(at[-1]), states[-1:], spreads[-1:]
+        if self._late_s > 0:
+            past_s = np.concatenate([self._past_s, at[:-1]])
+            past_x = np.concatenate([self._past_x, states[:-1]])
+            k = int(np.searchsorted(past_s, self._now - self._late_s, side="right")) - 1
+            self._past_s, self._past_x = past_s[max(k, 0) :], past_x[max(k, 0) :]
 
     def _errors(
         self, truth: Rows, position: Floats, covariance: Floats, reckoned: Floats
@@ -353,13 +374,9 @@ class Localiser(Replay):
         sigmas = [start.sigma_position_m, start.sigma_position_m, start.sigma_heading_rad]
         x0, P0 = np.array([x, y, heading]), np.diag(sigmas) ** 2
         self._filter = _build(filter_name, settings, x0, P0, models, self._late_s)
-        # The state at `now`, and the pose by dead reckoning alone.
-        self._x: Floats = x0[None]
-        self._P: Floats = P0[None]
-        self._reckoned = x0[None]
-        # States that a late measurement may be predicted from, before that.
-        self._past_s: Floats = np.empty(0)
-        self._past_x: Floats = np.empty((0, 3))
+        self._x, self._P = x0[None], P0[None]
+        self._reckoned = x0[None]  # the pose by dead reckoning alone
+        self._past_s, self._past_x = np.empty(0), np.empty((0, 3))
 
     def _start(self) -> tuple[float, float, float, float]:
         steered = "compass.csv" in self.log or "heading_rad" in self.log["odometry.csv"].names
@@ -460,26 +477,18 @@ class Localiser(Replay):
         located = np.empty(0, bool)
         if len(time):
             motion = np.insert(np.column_stack([chord.real, chord.imag, turn]), after, 0.0, axis=0)
-            of_row = np.insert(np.full(len(times), -1), after, np.arange(len(fused)))
-            nothing = np.full((len(times), 3), np.nan)
-            updates, results = self._fused(
-                np.insert(nothing, after, fused.z, axis=0),
-                np.insert(nothing, after, fused.place, axis=0),
-                np.insert(np.zeros(len(times)), after, fused.time_s - fused.taken_s),
-                fused,
-                of_row,
-                dt=np.insert(np.diff(bounds), after, 0.0),
-                input=motion,
-            )
+            steps = np.insert(np.diff(bounds), after, 0.0)
+            updates, results = self._fused(fused, times, after, dt=steps, input=motion)
             x = np.concatenate([result.x for result in results])
             covariance = np.concatenate([result.P for result in results])
             if self._filter.components > 1:
                 for name in tables.MIXTURE:
                     mixture[name] = np.concatenate([getattr(result, name) for result in results])
             _fill(columns, np.flatnonzero(used), updates)
+            measured = np.insert(np.zeros(len(times), bool), after, True)
             ranged = fused.sensor == tables.RANGE
             sigma = np.hypot(fused.noise[ranged, 0], fused.noise[ranged, 1])
-            located = _located(covariance[of_row >= 0][ranged], fused.z[ranged, 0], sigma)
+            located = _located(covariance[measured][ranged], fused.z[ranged, 0], sigma)
 
         # The state after the last row of each time, behind that before this stretch.
         final = np.flatnonzero(np.diff(time, append=math.inf) > 0)
@@ -506,13 +515,8 @@ class Localiser(Replay):
         if self.smoothing is not None:
             before = (self._x, self._P)
             track = Track(final, at, before, truth[:, :3], partial(carry, segments), heading_of)
-        self._now, self._x, self._P = float(at[-1]), states[-1:], spreads[-1:]
+        self._move_on(at, states, spreads)
         self._reckoned = reckoned[-1:]
-        if self._late_s > 0:
-            past_s = np.concatenate([self._past_s, at[:-1]])
-            past_x = np.concatenate([self._past_x, states[:-1]])
-            k = int(np.searchsorted(past_s, self._now - self._late_s, side="right")) - 1
-            self._past_s, self._past_x = past_s[max(k, 0) :], past_x[max(k, 0) :]
         self._motion.forget(self._past_s[0] if len(self._past_s) else self._now)
         estimates = _estimates(at[1:], states[1:], heading_of, spreads[1:], reckoned[1:])
         if self._filter.components > 1:
@@ -599,8 +603,7 @@ class Tracker(Replay):
             )
         self._now = self.start[0]
         self._started = False
-        self._past_s: Floats = np.empty(0)
-        self._past_x: Floats = np.empty((0, 6))
+        self._past_s, self._past_x = np.empty(0), np.empty((0, 6))
 
     def _start(self) -> tuple[float, float, float, float]:
         start = self._from_file("start.csv")
@@ -639,8 +642,7 @@ class Tracker(Replay):
         else:
             self._filter = _build(self.filter_name, self.settings, x0, P0, models, self._late_s)
         self._now, self._started = time, True
-        self._x: Floats = x0[None]
-        self._P: Floats = P0[None]
+        self._x, self._P = x0[None], P0[None]
 
     def _advance(self, limit: float, *, last: bool) -> Batch:
         came, columns, used = self._measurements(math.inf if last else limit, math.inf)
@@ -680,12 +682,7 @@ class Tracker(Replay):
         if self.smoothing is not None:
             before = (self._x, self._P)
             track = Track(np.arange(len(x)), at, before, truth[:, :3], carried, course)
-        self._now, self._x, self._P = float(at[-1]), states[-1:], spreads[-1:]
-        if self._late_s > 0:
-            past_s = np.concatenate([self._past_s, at[:-1]])
-            k = int(np.searchsorted(past_s, self._now - self._late_s, side="right")) - 1
-            self._past_s = past_s[max(k, 0) :]
-            self._past_x = np.concatenate([self._past_x, states[:-1]])[max(k, 0) :]
+        self._move_on(at, states, spreads)
         estimates = _estimates(at[1:], states[1:], course, spreads[1:], None)
         if self.spatial:
             depth = (states[1:, 2], spreads[1:, 2, 2])
@@ -757,16 +754,8 @@ class Tracker(Replay):
         bare = np.setdiff1d(times, fused.time_s)
         after = np.searchsorted(bare, fused.time_s, side="right")
         time = np.insert(bare, after, fused.time_s)
-        of_row = np.insert(np.full(len(bare), -1), after, np.arange(len(fused)))
-        nothing = np.full((len(bare), 3), np.nan)
-        updates, results = self._fused(
-            np.insert(nothing, after, fused.z, axis=0),
-            np.insert(nothing, after, fused.place, axis=0),
-            np.insert(np.zeros(len(bare)), after, fused.time_s - fused.taken_s),
-            fused,
-            of_row,
-            dt=np.diff(time, prepend=self._now),
-        )
+        steps = np.diff(time, prepend=self._now)
+        updates, results = self._fused(fused, bare, after, dt=steps)
         _fill(columns, of_table, updates)
         x = np.concatenate([result.x for result in results])
         covariance = np.concatenate([result.P for result in results])

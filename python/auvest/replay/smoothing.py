@@ -125,7 +125,7 @@ class Smoothing:
     def _go_back(self) -> tuple[Floats, Floats] | None:
         """Smooth the batches from the last to the first; give the belief at the start."""
         known: Any = None
-        ahead: tuple[dict[str, Any], list[Any]] = ({}, [])  # the rows behind a batch
+        ahead: tuple[dict[str, Any], list[Any]] | None = None  # the rows behind a batch, if asked
         for k in reversed(range(len(self._filters))):
             batch, record = self._load("batch", k)
             filter_ = self._filters[k]
@@ -135,12 +135,14 @@ class Smoothing:
                     self._save("smoothed", k, (track.before[0][:0], track.before[1][:0]))
                 continue
             count = len(record["z"])
-            parts = [(record, self._sensors[k])]
-            rows, sensors = _joined([*parts, ahead] if ahead[0] else parts)
+            rows, sensors = record, self._sensors[k]
+            if ahead is not None:
+                rows, sensors = _joined([(rows, sensors), ahead])
             x, P, known = filter_._back(filter_._filter, rows, sensors, count, known, self._lag_s)
             final = batch.track.final
             self._save("smoothed", k, (x[final].astype(float), P[final].astype(float)))
-            ahead = (rows_of(rows, 0, lookahead(rows, filter_.late_s, self._lag_s)(0)), sensors)
+            reach = lookahead(rows, filter_.late_s, self._lag_s)(0)
+            ahead = (rows_of(rows, 0, reach), sensors) if reach > 0 else None
         if known is None or self._lag_s is not None:
             return None
         return known[0][None].astype(float), known[1][None].astype(float)
