@@ -1,12 +1,12 @@
 """What auvest takes on the chip: measured again, compared with what is committed and promised."""
 
-import os
 from dataclasses import replace
 
 import pytest
 
 from auvest.firmware import fit
 from firmware import budgets
+from tests.slow import ASKED, SLOW
 
 pytest_plugins = ["board_support"]
 
@@ -43,7 +43,7 @@ ELSEWHERE += [("cortex-m0", "robust_ekf_update"), ("riscv32imc", "robust_ekf_upd
 
 def test_nothing_has_grown_on_other_chips(runner, tmp_path, monkeypatch):
     monkeypatch.setenv("AUVEST_BOARD", str(runner))
-    wanted = None if "AUVEST_SLOW_TESTS" in os.environ else ELSEWHERE
+    wanted = None if ASKED else ELSEWHERE
     measured = budgets.measure_elsewhere(tmp_path, wanted)
     others = committed(*budgets.TARGETS[:1], *budgets.CHIPS)
     asked = [row for row in others if wanted is None or (row.target, row.program) in wanted]
@@ -51,7 +51,7 @@ def test_nothing_has_grown_on_other_chips(runner, tmp_path, monkeypatch):
     assert budgets.growth(measured, asked) == []
 
 
-@pytest.mark.skipif("AUVEST_SLOW_TESTS" not in os.environ, reason="AUVEST_SLOW_TESTS is not set")
+@SLOW
 def test_what_does_not_fit_an_atmega328p_has_no_row(tmp_path):
     assert budgets.measure_elsewhere(tmp_path, [(budgets.SMALL_AVR, "slatf1")]) == []
 

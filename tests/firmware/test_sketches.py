@@ -1,6 +1,5 @@
 """The example sketches: they compile cleanly, run, and say what they should; memory is watched."""
 
-import os
 import re
 import shutil
 
@@ -13,6 +12,7 @@ from auvest.firmware.sketch import UNO, SketchError
 from auvest.simulation import paper_aukf
 from auvest.simulation.tracking import Scenario, simulate
 from firmware import replay_record
+from tests.slow import SLOW
 
 pytest_plugins = ["board_support"]
 
@@ -250,9 +250,6 @@ def test_globals_beyond_the_ram_are_refused(build_sketch):
 # ---- The watchdog --------------------------------------------------------------------------------
 
 GUARDED = ["beacon_navigation", "mission", "power_cuts", "slave_tracking", "tracking_loop"]
-slow = pytest.mark.skipif(
-    "AUVEST_SLOW_TESTS" not in os.environ, reason="AUVEST_SLOW_TESTS is not set"
-)
 
 
 @pytest.mark.parametrize("name", GUARDED)
@@ -264,7 +261,7 @@ def test_the_watchdog_guards_the_loop(name, root):
     assert not re.search(r"ISR\(", text)
 
 
-@slow
+@SLOW
 @pytest.mark.parametrize("name", [name for name in GUARDED if name != "power_cuts"])
 def test_a_loop_that_hangs_is_ended_by_the_watchdog(name, build_edited, board):
     """Two seconds after it was last fed; the loop hangs in its first pass."""
@@ -279,7 +276,7 @@ def test_a_loop_that_hangs_is_ended_by_the_watchdog(name, build_edited, board):
     assert 2.0 < at_s < 2.0 * 1.1 + 0.2
 
 
-@slow
+@SLOW
 @pytest.mark.parametrize("name", GUARDED)
 def test_a_sketch_whose_instruments_are_silent_is_not_ended(name, compiled, board):
     with board(compiled(name).elf, for_s=6.0) as running:

@@ -6,7 +6,6 @@ The world is the paper's scenario. What the sketch reported as measured is repla
 (firmware/parity), and everything that it computed must follow from it.
 """
 
-import os
 import re
 from dataclasses import dataclass, field
 from functools import reduce
@@ -22,6 +21,7 @@ from auvest.firmware.sketch import SketchError
 from firmware.parity import slatf
 from firmware.parity.slatf import MASTER, READING, SLAVE, Record, World, paper_world
 from firmware.parity.targets import AVR_PARTICLES, SLATF_TARGETS
+from tests.slow import SLOW
 
 pytest_plugins = ["board_support"]
 
@@ -183,15 +183,7 @@ def assert_same_bits(run, trace):
         gated = row["gated"]
 
 
-def kinds():
-    yield from (SHARED, "slatf2")
-    slow = "AUVEST_SLOW_TESTS" in os.environ
-    yield pytest.param(
-        "slatf1", marks=pytest.mark.skipif(not slow, reason="AUVEST_SLOW_TESTS is not set")
-    )
-
-
-@pytest.mark.parametrize("kind", list(kinds()))
+@pytest.mark.parametrize("kind", [SHARED, "slatf2", pytest.param("slatf1", marks=SLOW)])
 def test_a_minute_with_the_bits_of_the_host(kind, sketch, build_edited, play, on_the_host):
     particles, elf = PARTICLES, sketch
     if kind in PAPER:  # with as many as the chip has room for, and nothing that guards it
