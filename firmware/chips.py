@@ -105,7 +105,7 @@ class Run:
     trace: bytes
 
 
-def _arm(name: str, machine: str, memory: Memory, *flags: str) -> Chip:
+def _arm(name: str, machine: str, flags: Sequence[str], memory: Memory) -> Chip:
     chosen = (*flags, "-mthumb", "--specs=nano.specs")
     return Chip(name, "arm-none-eabi", chosen, ("qemu-system-arm", "-machine", machine), memory)
 
@@ -114,19 +114,14 @@ _NRF51 = Memory(0, 256 << 10, 0x20000000, 16 << 10)
 _MPS2 = Memory(0, 4 << 20, 0x20000000, 4 << 20)
 _VIRT = Memory(0x80000000, 4 << 20, 0x80400000, 4 << 20)
 
+_M7 = ("-mcpu=cortex-m7", "-mfloat-abi=hard", "-mfpu=fpv5-sp-d16")
+
 _CHIPS = (
-    _arm("cortex-m0", "microbit", _NRF51, "-mcpu=cortex-m0"),
+    _arm("cortex-m0", "microbit", ["-mcpu=cortex-m0"], _NRF51),
     # The same instructions, scheduled for the shorter pipeline.
-    _arm("cortex-m0plus", "microbit", _NRF51, "-mcpu=cortex-m0plus"),
-    _arm("cortex-m3", "mps2-an385", _MPS2, "-mcpu=cortex-m3"),
-    _arm(
-        *("cortex-m4f", "mps2-an386", _MPS2),
-        *("-mcpu=cortex-m4", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"),
-    ),
-    _arm(
-        *("cortex-m7", "mps2-an500", _MPS2),
-        *("-mcpu=cortex-m7", "-mfloat-abi=hard", "-mfpu=fpv5-sp-d16"),
-    ),
+    _arm("cortex-m0plus", "microbit", ["-mcpu=cortex-m0plus"], _NRF51),
+    *(_arm(name, *board, _MPS2) for name, board in hil.CORTEX.items()),
+    _arm("cortex-m7", "mps2-an500", _M7, _MPS2),
     # Debian has no C++ library for it: the headers are those for AVR, and Eigen is told so.
     Chip(
         "riscv32imc",
@@ -222,9 +217,7 @@ def run(chip: Chip, program: Path, record: bytes, folder: Path) -> Run:
     require(chip.qemu[0])
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "record.bin").write_bytes(record)
-    command = [*chip.qemu, "-nographic", "-monitor", "none", "-serial", "none"]
-    command += ["-semihosting-config", "enable=on,target=native", "-kernel", str(program.resolve())]
-    _call(command, f"running on {chip.name}", folder)
+    _call(hil.semihosted(chip.qemu, program.resolve()), f"running on {chip.name}", folder)
     stack = int.from_bytes((folder / "stack.bin").read_bytes(), "little")
     return Run(stack, (folder / "trace.bin").read_bytes())
 

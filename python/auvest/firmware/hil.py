@@ -322,11 +322,16 @@ def build_sketch(program: Bench, folder: Path, *, serial: bool = False) -> Compi
 
 
 def qemu(machine: str, program: Path, arguments: Sequence[str]) -> list[str]:
-    """Give the command that runs a program on a board of QEMU, its files those of this computer."""
-    given = ",".join(f"arg={part}" for part in (program.stem, *arguments))
-    command = ["qemu-system-arm", "-machine", machine, "-nographic", "-monitor", "none"]
-    command += ["-serial", "none", "-kernel", str(program)]
-    return [*command, "-semihosting-config", f"enable=on,target=native,{given}"]
+    """Give the command that runs a program on a board of QEMU with an ARM."""
+    return semihosted(("qemu-system-arm", "-machine", machine), program, arguments)
+
+
+def semihosted(emulator: Sequence[str], program: Path, arguments: Sequence[str] = ()) -> list[str]:
+    """Give the command that runs a program on a board, its files those of this computer."""
+    command = [*emulator, "-nographic", "-monitor", "none", "-serial", "none"]
+    given = "".join(f",arg={part}" for part in (program.stem, *arguments))
+    command += ["-kernel", str(program)]
+    return [*command, "-semihosting-config", f"enable=on,target=native{given}"]
 
 
 def _play(
