@@ -145,6 +145,8 @@ def replay(
     columns = tables.MEASUREMENTS + tables.SHOWN
     measurements, outliers, shown = Samples(columns), Samples(columns), Shown()
     interrupted = False
+    if smooth and log.echoing:
+        raise ValueError(f"a replay of echoes cannot be smoothed: filter {name} has no way back")
     with ExitStack() as stack:
         files = _open(folder, stack, smooth=smooth)
         if smooth:
@@ -184,6 +186,8 @@ def replay(
     numbers = tally.numbers()
     if smooth:
         numbers["smoothed"] = {"lag_s": lag_s, **tally.smoothed()}
+    if log.echoing:
+        numbers["masters"] = tally.masters()
     numbers["origin_m"] = None if origin is None else list(origin)
     earth = log.frame.origin
     numbers["origin_deg"] = None if earth is None else list(earth)
