@@ -1,4 +1,4 @@
-"""Robots that see each other: what a recording of several has, and the tracks that can be cut of it.
+"""Robots that see each other: a recording of several, and the tracks that can be cut out of it.
 
 A track is one robot, the master, as another, the slave, sees it.
 """
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from auvest._arguments import Floats
 from auvest.logs.reader import Rows
 
 #: A track has no longer gap between two sightings, s, and lasts so long.
@@ -60,7 +61,7 @@ class Robots:
         after = np.clip(after, 1, len(known) - 1)
         return inside & (known[after] - known[after - 1] <= TRUTH_GAP_S)
 
-    def pose(self, robot: int, time_s: Rows) -> Rows:
+    def pose(self, robot: int, time_s: Floats) -> Rows:
         """Give the true poses of a robot, along lines between samples."""
         truth = self.truth[robot]
         columns = (truth[:, 1], truth[:, 2], np.unwrap(truth[:, 3]))

@@ -177,7 +177,7 @@ def mrclam6(source: Path) -> dict[str, Log]:
     Sightings in both directions are ranges of the slave, their bearings are left out. The others'
     positions, and the truth, are those of the motion capture.
     """
-    return _slaves(robots_of_mrclam6(source))
+    return _slaves(robots_of_mrclam6(source, "range"))
 
 
 @_importer
@@ -223,9 +223,10 @@ def two_vehicles(source: Path) -> dict[str, Log]:
     return {_name(source): log}
 
 
-def robots_of_mrclam6(source: Path) -> Robots:
-    """Read groundtruth.csv, odometry.csv and sightings.csv of several robots."""
-    sightings = _table(source / "sightings.csv", "t", "observer", "subject", "range", "bearing")
+def robots_of_mrclam6(source: Path, *seen: str) -> Robots:
+    """Read groundtruth.csv, odometry.csv and what was seen in sightings.csv, of several robots."""
+    seen = seen or ("range", "bearing")
+    sightings = _table(source / "sightings.csv", "t", "observer", "subject", *seen)
     odometry = _table(source / "odometry.csv", "robot", "t", "v", "w")
     truth = _table(source / "groundtruth.csv", "robot", "t", "x", "y", "theta")
     robots = np.unique(truth[:, 0]).astype(int).tolist()

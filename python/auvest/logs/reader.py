@@ -533,14 +533,18 @@ class LogFolder:
         names = set(table.names)
         if names & {"left_m", "left_m_s"}:
             raise LogError(
-                table.path, "says how the craft moves sideways, which filters of echoes do not know",
+                table.path,
+                "says how the craft moves sideways, which filters of echoes do not know",
                 line=1,
             )  # fmt: skip
-        if not names & {"turn_rad", "yaw_rate_rad_s"} and not {"speed_m_s", "heading_rad"} <= names:
+        turns = names & {"turn_rad", "yaw_rate_rad_s"}
+        if not turns and not {"speed_m_s", "heading_rad"} <= names:
             raise LogError(
-                table.path, "has no turn_rad or yaw_rate_rad_s, nor speed_m_s with heading_rad: how "
-                "does the slave turn?", line=1,
-            )  # fmt: skip
+                table.path,
+                "has no turn_rad or yaw_rate_rad_s, nor speed_m_s with heading_rad: how does the "
+                "slave turn?",
+                line=1,
+            )
 
     def _find_origin(self) -> None:
         """Find where on Earth (0, 0) is, if a file has places there."""

@@ -20,7 +20,6 @@ from auvest.replay.config import FilterName, Settings
 from auvest.replay.engine import replay_of
 from auvest.replay.health import Health, Residuals, findings, health, start_findings
 
-
 #: Sections of the settings that are not for all kinds of log.
 _SECTIONS = {
     "odometry": ("ranging", "echoes"),
@@ -182,6 +181,7 @@ def _replayed(
 ) -> list[Finding]:
     name = filter_of(log, settings, filter_name)
     local = shifted(log, local_origin(log))
-    for batch in replay_of(local, settings, name).batches():
+    engine = replay_of(local, settings, name)
+    for batch in engine.batches():
         left.add(batch)
-    return innovations(local, settings, name, left, found)
+    return [*engine.findings(), *innovations(local, settings, name, left, found)]

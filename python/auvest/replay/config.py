@@ -14,8 +14,8 @@ from auvest._fields import flag, fraction, integer, not_negative, number, positi
 from auvest._outputs import is_plain_file
 from auvest.kernels import KERNELS, Kernel, RejectionStreak
 from auvest.logs.layout import COLUMNS, FILES
-from auvest.models import ConstantAcceleration
 from auvest.logs.reading import SEPARATORS, UNITS, Axes, FileReading, Reading, columns_of
+from auvest.models import ConstantAcceleration
 
 if sys.version_info >= (3, 11):
     import tomllib

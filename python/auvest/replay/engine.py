@@ -29,6 +29,7 @@ from auvest.filters import Aukf, GaussianFilter, RobustEkf, RobustUkf, RunResult
 from auvest.intervals import CovarianceBudget, FixedInterval, IntervalPolicy, MahalanobisInterval
 from auvest.logs import LogError, LogFolder, Stream, merge
 from auvest.logs.changed import ChangedLog, columns_changed
+from auvest.logs.findings import Finding
 from auvest.logs.reader import Rows
 from auvest.models import (
     ConstantAcceleration,
@@ -153,6 +154,10 @@ class Replay(ABC):
                 self._sources.forget(limit - self._late_s)
                 self.instruments.depths.forget(limit - self._late_s)
                 self.instruments.source_depths.forget(limit - self._late_s)
+
+    def findings(self) -> list[Finding]:
+        """Say what the filter itself is to be blamed for, at the end."""
+        return []
 
     def _with_places(self, batch: Batch) -> Batch:
         """Say where the sources of the measurements were, while that is known."""

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from auvest._arguments import Floats
 from auvest.logs.reader import Rows
 
 
@@ -62,7 +63,7 @@ class Held:
         values: Rows = np.where((k >= 0)[:, None], self._values[np.maximum(k, 0)], 0.0)
         return values
 
-    def means(self, time_s: Rows, factors: tuple[float, ...] | float = 1.0) -> Rows:
+    def means(self, time_s: Floats, factors: tuple[float, ...] | float = 1.0) -> Rows:
         """Give means from each time (T + 1,) to the next, times factors, shape (T, columns)."""
         if len(self.edges) == 0:
             return np.zeros((len(time_s) - 1, self._values.shape[1]))
@@ -72,7 +73,7 @@ class Held:
         beyond = self._integral[-1] + self._values[-1] * (end - self.edges[-1])
         integral = np.concatenate([self._integral, beyond[None]])
         at = np.column_stack([np.interp(time_s, edges, column) for column in integral.T])
-        means: Rows = factors * np.diff(at, axis=0) / np.diff(time_s)[:, None]
+        means: Rows = np.array(factors) * np.diff(at, axis=0) / np.diff(time_s)[:, None]
         return means
 
     def forget(self, before: float) -> None:

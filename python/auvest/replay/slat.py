@@ -7,6 +7,7 @@ masters.csv does not tell of is known from its first echo on, which says where i
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +18,7 @@ import auvest
 from auvest import registry
 from auvest._arguments import Floats
 from auvest.logs import LogError, LogFolder
+from auvest.logs.findings import Finding, finding
 from auvest.logs.reader import Rows
 from auvest.models import ConstantAcceleration
 from auvest.replay import tables
@@ -30,6 +32,7 @@ from auvest.slat import (
     UNKNOWN_MASTER,
     DeadReckoning,
     EkfSlat,
+    OverconfidenceWarning,
     ParticleSlatFilter,
     Slatf,
     SlatFilter,
@@ -206,7 +209,10 @@ class Companion(Replay):
         heard = heard[(heard > self._now) & (heard <= limit)]
         mean_s = self.settings.slave.mean_s
         if mean_s == 0:
-            parts = [self._readings.until(limit), *(one.until(limit) for one in self._plans.values())]
+            parts = [
+                self._readings.until(limit),
+                *(one.until(limit) for one in self._plans.values()),
+            ]
             lines = np.concatenate([*parts, [self._line_s] * self._increments])
             return np.unique(np.concatenate([heard, lines[(lines > self._now) & (lines <= limit)]]))
         ends = np.append(heard, limit) if limit > max(self._now, *heard[-1:]) else heard
@@ -251,6 +257,16 @@ class Companion(Replay):
             masters=masters,
         )
 
+    def findings(self) -> list[Finding]:
+        """Say that particles were resampled too often."""
+        if not isinstance(self._slat, Slatf) or not self._slat.overconfident:
+            return []
+        message = (
+            f"{self._slat.resamplings} resamplings of {self._slat.particles} particles: the "
+            "covariance is too small; take slatf-joint, or more particles"
+        )
+        return [finding("overconfident", message)]
+
     def _with_places(self, batch: Batch) -> Batch:
         return batch  # they are where the filter believes the masters to be
 
@@ -284,7 +300,7 @@ class Companion(Replay):
         offset = (0.0, s.turn_offset_rad_s if turns else 0.0)
         if self.settings.slave.mean_s > 0:
             return self._readings.means(edges, factors) + offset
-        read: Rows = factors * self._readings.at(edges[:-1]) + offset
+        read: Rows = np.array(factors) * self._readings.at(edges[:-1]) + offset
         return read
 
     def _go(self, edges: Rows, u: Rows, heard: _Heard) -> _Way:
@@ -357,7 +373,9 @@ class Companion(Replay):
             options = {"z": heard.z[mine], "z_time_s": heard.time_s[mine], "master": numbers}
         if self._plans and masters:
             options["changes"] = self._changes(edges)
-        run = self._slat.run(edges, u, **options)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", OverconfidenceWarning)  # said by findings
+            run = self._slat.run(edges, u, **options)
         return x, np.array(masters).reshape(-1, 6), run
 
     def _changes(self, edges: Rows) -> Floats:
@@ -378,8 +396,10 @@ class Companion(Replay):
         used: npt.NDArray[np.intp],
         columns: dict[str, npt.NDArray[Any]],
     ) -> None:
-        """Say what became of echoes. The core counts those that were refused, of each time: they
-        are taken for those that lie farthest from where the master was expected.
+        """Say what became of echoes.
+
+        The core counts those of each time that were refused: they are taken for those that lie
+        farthest from where the master was expected.
         """
         row = np.searchsorted(way.time_s, heard.time_s, side="left")
         later = (heard.time_s > self._now) & ~heard.first
@@ -409,7 +429,7 @@ class Companion(Replay):
             columns[f"weight_{m}"][used] = np.where(refused, 0.0, 1.0)
 
     def _heading(self, way: _Way, u: Rows) -> tuple[Floats, Floats]:
-        """Give headings and their standard deviations: those of the compass, where it tells them."""
+        """Give headings and their standard deviations; those of the odometry, where it has them."""
         if self._compass:
             return u[:, 1], np.full(len(u), self.settings.slave.sigma_heading_rad)
         return way.x[:, 2], np.sqrt(way.P[:, 2, 2])
@@ -507,13 +527,12 @@ class _Way:
             P=whole([run.P for run in runs], pose, pose),
             masters_x=whole(after, most, 6),
             masters_P=whole([padded(run.masters_P) for run in runs], most, 6, 6),
-            before_x=whole(
-                [np.concatenate([x[None], run.x[:-1]]) for x, _, run in parts], pose
-            ),
+            before_x=whole([np.concatenate([x[None], run.x[:-1]]) for x, _, run in parts], pose),
             before_masters=whole(
                 [np.concatenate([first, x[:-1]]) for first, x in zip(before, after, strict=True)],
-                most, 6,
-            ),  # fmt: skip
+                most,
+                6,
+            ),
             u=u,
             dt=np.diff(edges),
             nis=whole([run.nis for run in runs]),
@@ -531,8 +550,8 @@ class _Way:
             shortened = math.exp(0.5 * motion.sigma_heading_rad**2) if motion.compensate_bias else 1
             way = dt * u[:, 0] * shortened
         else:
-            heading = x[:, 2] + dt * u[:, 1]
-            course, way = x[:, 2] + 0.5 * dt * u[:, 1], dt * u[:, 0]
+            course, heading = x[:, 2], x[:, 2] + dt * u[:, 1]
+            way = dt * u[:, 0]
         slave = x[:, :2] + way[:, None] * np.column_stack([np.cos(course), np.sin(course)])
         master = self.before_masters[row, number]
         step = dt[:, None]

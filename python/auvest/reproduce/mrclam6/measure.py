@@ -28,7 +28,7 @@ from auvest import (
     UnicycleMotion,
 )
 from auvest._arguments import Floats
-from auvest.importers.robots import DURATION_S, GAP_S, TRUTH_GAP_S
+from auvest.importers.robots import DURATION_S, GAP_S, TRUTH_GAP_S  # noqa: F401 (the page names it)
 from auvest.importers.sets import robots_of_mrclam6
 from auvest.replay.readings import Held
 from auvest.replay.slat import first_seen
