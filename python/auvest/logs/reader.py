@@ -31,8 +31,15 @@ _OTHER_UNITS = frozenset(
         "cm", "km", "ft", "m_s", "mm_s", "cm_s", "km_h", "kn", "knots",
     )
 )  # fmt: skip
-#: More than any file has that is read as a whole: beacons.csv and start.csv.
+#: More than any file has that is read as a whole: beacons.csv, masters.csv and start.csv.
 SMALL_FILE_LINES = 100_000
+#: Files that no filter sees.
+TRUTHS = ("truth.csv", "master_truth.csv")
+#: Files that are of no use beside echoes.csv.
+NOT_WITH_ECHOES = (
+    "ranges.csv", "fixes.csv", "positions.csv", "velocities.csv", "depth.csv", "compass.csv",
+    "beacons.csv", "leaders.csv",
+)  # fmt: skip
 
 
 class LogError(ValueError):
@@ -459,7 +466,7 @@ class LogFolder:
     LogError
         If it is not a folder with measurements: odometry.csv with ranges.csv, fixes.csv or
         positions.csv, or one of the last two alone; beside ranges and fixes beacons.csv,
-        leaders.csv or both.
+        leaders.csv or both; or odometry.csv with echoes.csv, and none of these.
     """
 
     def __init__(self, path: Path, *, truth: bool = True, reading: Reading | None = None) -> None:
@@ -473,7 +480,7 @@ class LogFolder:
                 raise LogError(one, f"is not there, and {reading.of(name).where} names it")
         names = [name for name, one in paths.items() if one.exists()]
         if not truth and ("start.csv" in names or "odometry.csv" not in names):
-            names = [name for name in names if name != "truth.csv"]
+            names = [name for name in names if name not in TRUTHS]
         self.frame = Frame(reading.frame)
         self.tables = {
             name: CsvTable(paths[name], name=name, reading=reading.of(name), frame=self.frame)
@@ -484,9 +491,14 @@ class LogFolder:
 
     def _require_what_a_log_needs(self) -> None:
         path = self.path
+        if "echoes.csv" in self:
+            self._require_what_echoes_need()
+            return
         measured = [name for name in ("ranges.csv", "fixes.csv", "positions.csv") if name in self]
         if not measured:
-            raise LogError(path, "has neither ranges.csv nor fixes.csv nor positions.csv")
+            raise LogError(
+                path, "has neither ranges.csv nor fixes.csv nor positions.csv nor echoes.csv"
+            )
         if "odometry.csv" not in self:
             if "ranges.csv" in self:
                 raise LogError(path, "has ranges.csv but no odometry.csv", cause="no_odometry")
@@ -508,9 +520,38 @@ class LogFolder:
                     "compass.csv: how does the craft turn?", line=1,
                 )  # fmt: skip
 
+    def _require_what_echoes_need(self) -> None:
+        others = {*NOT_WITH_ECHOES} & set(self.tables)
+        if others:
+            raise LogError(
+                self.path, f"has echoes.csv and {min(others)}; filters that hear the echoes of "
+                "masters take nothing else that is measured",
+            )  # fmt: skip
+        if "odometry.csv" not in self:
+            raise LogError(self.path, "has echoes.csv but no odometry.csv", cause="no_odometry")
+        table = self["odometry.csv"]
+        names = set(table.names)
+        if names & {"left_m", "left_m_s"}:
+            raise LogError(
+                table.path,
+                "says how the craft moves sideways, which filters of echoes do not know",
+                line=1,
+            )  # fmt: skip
+        turns = names & {"turn_rad", "yaw_rate_rad_s"}
+        if not turns and not {"speed_m_s", "heading_rad"} <= names:
+            raise LogError(
+                table.path,
+                "has no turn_rad or yaw_rate_rad_s, nor speed_m_s with heading_rad: how does the "
+                "slave turn?",
+                line=1,
+            )
+
     def _find_origin(self) -> None:
         """Find where on Earth (0, 0) is, if a file has places there."""
-        names = ("start.csv", "beacons.csv", "leaders.csv", "positions.csv", "truth.csv")
+        names = (
+            "start.csv", "beacons.csv", "leaders.csv", "positions.csv", "masters.csv", "truth.csv",
+            "master_truth.csv",
+        )  # fmt: skip
         geographic = [name for name in names if name in self and self[name].geographic]
         local = [name for name in names if name in self and not self[name].geographic]
         if "origin.csv" in self:
@@ -534,6 +575,11 @@ class LogFolder:
 
     def __getitem__(self, name: str) -> CsvTable:
         return self.tables[name]
+
+    @property
+    def echoing(self) -> bool:
+        """True if a slave hears the echoes of masters."""
+        return "echoes.csv" in self
 
     @property
     def tracking(self) -> bool:

@@ -1,7 +1,8 @@
-"""Writing the tables of a replay as they come: CSV and Parquet, and the track as TUM text."""
+"""Writing the tables of a replay as they come: Parquet and CSV, and the track as TUM text."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -37,22 +38,31 @@ class _Sink:
 
 
 class TableFiles(_Sink):
-    """``<stem>.csv`` and ``<stem>.parquet`` in a folder, written a batch at a time.
+    """``<stem>.parquet`` or ``<stem>.csv`` in a folder, or both, written a batch at a time.
 
     The Parquet file is readable after a clean end or an interruption, once it is closed.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder.
+    stem : str
+        Name of the files.
+    formats : iterable of {"parquet", "csv"}
+        Which of them.
     """
 
-    def __init__(self, folder: Path, stem: str) -> None:
+    def __init__(self, folder: Path, stem: str, formats: Iterable[str]) -> None:
         super().__init__()
-        self.paths = (folder / f"{stem}.csv", folder / f"{stem}.parquet")
+        self.paths = {one: folder / f"{stem}.{one}" for one in formats}
 
     def write(self, columns: Columns) -> None:
         """Append rows; the first batch fixes names and types."""
         table = pa.table(dict(columns))
         if not self._writers:
+            kinds = {"csv": pa_csv.CSVWriter, "parquet": pa_parquet.ParquetWriter}
             self._writers = [
-                pa_csv.CSVWriter(self._open(self.paths[0]), table.schema),
-                pa_parquet.ParquetWriter(self._open(self.paths[1]), table.schema),
+                kinds[one](self._open(path), table.schema) for one, path in self.paths.items()
             ]
         for writer in self._writers if len(table) else ():
             writer.write_table(table)
