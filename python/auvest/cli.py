@@ -20,6 +20,7 @@ from auvest.commands.exit_codes import EXIT_CODES
 
 #: First line of help of each command, by the words that call it.
 COMMANDS: Mapping[tuple[str, ...], str] = {
+    ("calibrate",): "Find the noises of the settings by the innovations of logs alone.",
     ("capture",): "Record what a sketch reports: a CSV file, a figure, a table.",
     ("check",): "Check a log before it is used: what is there, and what may be wrong with it.",
     ("compare",): "Replay a recorded run through several filters, side by side.",
@@ -180,6 +181,8 @@ def _main(
       auvest check my_log                what is wrong with a recording, before it is used
 
       auvest replay --help               your own recordings through any filter
+
+      auvest calibrate my_log            sigmas from the log alone, as settings to use
 
       auvest compare --help              a recording through several filters, side by side
 

@@ -139,7 +139,7 @@ def diagnose(
     return list(found.values())
 
 
-def log_likelihoods(rows: Columns) -> Floats:
+def log_likelihoods(rows: Columns, outliers: float = OUTLIERS) -> Floats:
     """Logarithm of the likelihood of each measurement, given those before it.
 
     A measurement is an outlier with a small probability, and then anywhere within a wide reach;
@@ -156,11 +156,11 @@ def log_likelihoods(rows: Columns) -> Floats:
         inlier[more] -= np.log(rows[f"sigma_{k}"][more])
         inlier[more & near] += np.log(np.maximum(rows["range_m"][more & near], 1e-3))
         reach[more] += np.where(fix[more], math.log(2 * math.pi), math.log(OUTLIER_REACH_M))
-    return _with_outliers(inlier, reach)
+    return _with_outliers(inlier, reach, outliers)
 
 
-def _with_outliers(inlier: Floats, reach: Floats | float) -> Floats:
-    return np.logaddexp(math.log(1 - OUTLIERS) + inlier, math.log(OUTLIERS) - reach)
+def _with_outliers(inlier: Floats, reach: Floats | float, outliers: float = OUTLIERS) -> Floats:
+    return np.logaddexp(math.log(1 - outliers) + inlier, math.log(outliers) - reach)
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,7 @@ from auvest.logs.guess import guess
 from auvest.logs.reading import FileReading
 from auvest.replay.checks import Checked, check
 from auvest.replay.config import Settings, settings_from
-from auvest.replay.schema import SCHEMA
+from auvest.replay.toml import SCHEMA_LINE, file_sections
 
 #: A gap is so many usual steps long.
 GAP_STEPS = 10
@@ -91,7 +90,7 @@ def _text(
     unknown: list[str],
 ) -> str:
     lines = [
-        f"#:schema {SCHEMA.as_uri()}",
+        SCHEMA_LINE,
         "# Written by auvest init: a first guess. Read it, and compare sigmas with what you know",
         "# of your instruments. docs/logs.md says what else there is.",
         "#",
@@ -100,24 +99,13 @@ def _text(
         *(f"# Nothing is known of {_plain(name)}." for name in unknown),
     ]
     for name, one in files.items():
-        lines += _sections(name.removesuffix(".csv"), one)
+        lines += file_sections(name.removesuffix(".csv"), one)
     for section, values in document.items():
         lines += ["", f"[{section}]", *(f"{key} = {value!r}" for key, value in values.items())]
     kinds = set(checked.files)
     if "ranges" not in document and "ranges.csv" in kinds:
         lines += ["", "[ranges]", f"# sigma_m = {Settings().ranges.sigma_m}"]
     return "\n".join(lines) + "\n"
-
-
-def _sections(stem: str, one: FileReading) -> Iterator[str]:
-    """Give [columns] and [units] of a file."""
-    said = {"file": one.file} if one.file else {}
-    said |= {"separator": one.separator} if one.separator != "," else {}
-    said |= {"decimal": one.decimal} if one.decimal != "." else {}
-    for section, values in (("columns", {**said, **one.columns}), ("units", one.units)):
-        if values:
-            yield from ("", f"[{section}.{stem}]")
-            yield from (f"{key} = {json.dumps(value)}" for key, value in values.items())
 
 
 def _plain(text: str) -> str:
