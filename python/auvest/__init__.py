@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from auvest._headers import get_include as get_include
     from auvest.errors import FilterError as FilterError
     from auvest.errors import ModelError as ModelError
+    from auvest.errors import SweepError as SweepError
     from auvest.filters import Aukf as Aukf
     from auvest.filters import Ekf as Ekf
     from auvest.filters import Mixture as Mixture
@@ -74,6 +75,7 @@ if TYPE_CHECKING:
     from auvest.slat.models import PiecewiseAcceleration as PiecewiseAcceleration
     from auvest.slat.models import Sonar as Sonar
     from auvest.slat.models import UnicycleMotion as UnicycleMotion
+    from auvest.sweeps import sweep as sweep
 
     __version__: str
 else:
@@ -132,6 +134,7 @@ else:
         "SpeedHeading": "models",
         "SpeedHeadingCurrent": "models",
         "Status": "_core",
+        "SweepError": "errors",
         "UNKNOWN_MASTER": "slat",
         "Ukf": "filters",
         "UnicycleMotion": "slat.models",
@@ -140,6 +143,7 @@ else:
         "get_include": "_headers",
         "load_models": "models.library",
         "self_test": "_core",
+        "sweep": "sweeps",
     }
     __all__ = sorted([*_HOME, *_SUBMODULES])
 

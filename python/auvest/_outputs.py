@@ -242,14 +242,46 @@ class NewFolder:
             self._lock = -1
 
 
+def shared_folder(path: Path, command: str) -> None:
+    """Make a folder that any number of runs of a command fill together, or take it as it is.
+
+    Parameters
+    ----------
+    path : Path
+        The folder.
+    command : str
+        The words after ``auvest``.
+
+    Raises
+    ------
+    OutputError
+        If it holds what this command has not begun.
+    OSError
+        If it cannot be made.
+    """
+    path.mkdir(parents=True, exist_ok=True)
+    there = {name for name in _names(path) if not name.endswith(UNFINISHED)}
+    maker = _manifest(path).get("command")
+    if maker == command:
+        return
+    if there - {MANIFEST}:
+        whose = "what auvest has not written" if maker is None else f"results of 'auvest {maker}'"
+        raise OutputError(f"{path} holds {whose}: choose another folder")
+    _write_manifest(path, command, "shared")
+
+
 @contextlib.contextmanager
-def new_file(path: Path, mode: str = "wb", **options: Any) -> Iterator[IO[Any]]:
+def new_file(
+    path: Path, mode: str = "wb", *, hidden: bool = False, **options: Any
+) -> Iterator[IO[Any]]:
     """Write a file that takes the place of the one before as a whole.
 
-    It is made beside it under a name that nobody else has, so that no link is followed. A name is
-    given at the end; only a power cut can leave the new one empty.
+    It is made beside it under a name that nobody else has, which begins with a dot if it is
+    ``hidden``, so that no link is followed. A name is given at the end; only a power cut can leave
+    the new one empty.
     """
-    new = path.with_name(f"{path.name}.{secrets.token_hex(4)}{UNFINISHED}")
+    dot = "." if hidden else ""
+    new = path.with_name(f"{dot}{path.name}.{secrets.token_hex(4)}{UNFINISHED}")
     try:
         with new.open(mode.replace("w", "x"), **options) as file:  # x: it must not exist
             yield file

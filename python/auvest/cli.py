@@ -36,6 +36,9 @@ COMMANDS: Mapping[tuple[str, ...], str] = {
     ("library",): "Write the Arduino library: a zip for the IDE or PlatformIO.",
     ("mission",): "Play the vehicle that the sketch mission steers, on a board or simulated.",
     ("replay",): "Replay recorded runs through a filter.",
+    ("sweep",): (
+        "Sweep a grid or list of parameters over a scenario or a log, on all cores or a cluster."
+    ),
     ("version",): "Show the version, and what this build lacks.",
     ("simulate", "aukf"): (
         "Simulate the AUKF paper's scenario and show errors, intervals and consistency."
@@ -169,6 +172,8 @@ def _main(
       auvest simulate mekf               ranges with outliers: EKF and robust kernels
 
       auvest simulate mission            a torpedo steers itself by its own estimate
+
+      auvest sweep --help                any of these over a grid, on all cores or a cluster
 
       auvest reproduce mekf              the M-estimation EKF paper beside ours
 

@@ -64,3 +64,7 @@ class Interrupted(KeyboardInterrupt):
 
 class ModelError(ValueError):
     """A header with models cannot be loaded; the message begins with the line that is wrong."""
+
+
+class SweepError(RuntimeError):
+    """A sweep cannot go on: a task or a cluster failed. What was computed is kept."""

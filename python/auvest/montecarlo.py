@@ -44,6 +44,7 @@ def run(
     task: Task,
     runs: int,
     *,
+    first: int = 0,
     chunk: int = 10,
     workers: int | None = None,
     progress: Callable[[int, int], None] | None = None,
@@ -59,6 +60,8 @@ def run(
         depend on r alone; its random numbers come from stream r of a seed.
     runs : int
         Number of runs, positive.
+    first : int
+        Number of the first of them: runs that are done in several calls are those of one call.
     chunk : int
         Runs per call of the task, positive.
     workers : int, optional
@@ -87,6 +90,7 @@ def run(
         runs. Functions that simulate by :func:`run` put what they return in its place.
     """
     total = as_integer("runs", runs, 1, 2**53)
+    start = as_integer("first", first, 0, 2**53 - total)
     size = as_integer("chunk", chunk, 1, 2**53)
     threads = as_workers(workers)
     if progress is not None and not callable(progress):
@@ -98,29 +102,32 @@ def run(
     parts: dict[int, Columns] = {}
     done = 0
 
-    def finish(first: int, columns: Columns) -> None:
+    def size_of(begin: int) -> int:
+        return min(size, start + total - begin)
+
+    def finish(begin: int, columns: Columns) -> None:
         nonlocal done
-        parts[first] = columns
-        done += min(size, total - first)
+        parts[begin] = columns
+        done += size_of(begin)
         if progress is not None:
             progress(done, total)
 
-    def work(first: int) -> Columns:
-        columns = _checked(task(first, min(size, total - first)))
+    def work(begin: int) -> Columns:
+        columns = _checked(task(begin, size_of(begin)))
         if kept is not None:
-            kept.write(first, min(size, total - first), columns)
+            kept.write(begin, size_of(begin), columns)
         return columns
 
     with ThreadPoolExecutor(threads) as pool:
         try:
             todo = []
-            for first in range(0, total, size):
-                old = None if kept is None else kept.read(first, min(size, total - first))
+            for begin in range(start, start + total, size):
+                old = None if kept is None else kept.read(begin, size_of(begin))
                 if old is None:
-                    todo.append(first)
+                    todo.append(begin)
                 else:
-                    finish(first, old)
-            futures = {pool.submit(work, first): first for first in todo}
+                    finish(begin, old)
+            futures = {pool.submit(work, begin): begin for begin in todo}
             for future in as_completed(futures):
                 finish(futures[future], future.result())
         except BaseException as stop:

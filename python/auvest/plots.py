@@ -367,9 +367,19 @@ def own_style() -> Iterator[None]:
 
 
 def save(figure: Figure, path: Path) -> Path:
-    """Write a figure as PNG, the same bytes for the same figure, and return the path."""
-    with new_file(path) as file:
-        figure.savefig(file, format="png", dpi=DPI, metadata={"Software": None})
+    """Write a figure, the same bytes for the same figure, and return the path.
+
+    Parameters
+    ----------
+    figure : Figure
+    path : Path
+        Ends in ``.png`` or ``.svg``.
+    """
+    kind = path.suffix.removeprefix(".")
+    # What would differ from time to time: the program, the hour, the names of parts of the drawing.
+    unsaid = {"Software": None} if kind == "png" else {"Creator": None, "Date": None}
+    with new_file(path) as file, rc_context({"svg.hashsalt": "auvest"}):
+        figure.savefig(file, format=kind, dpi=DPI, metadata=unsaid)
     return path
 
 

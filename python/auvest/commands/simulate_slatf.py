@@ -246,17 +246,8 @@ def means_per_ping(result: SlatResult) -> dict[str, Floats]:
 
 
 def per_run(result: SlatResult) -> dict[str, npt.NDArray[Any]]:
-    """Collect one row per run."""
-    return {
-        "run": np.arange(len(result.status)),
-        "rmse_m": result.run_rmse_m,
-        "mean_error_m": np.nanmean(result.distance_m, axis=1),
-        "end_error_m": result.distance_m[:, -1],
-        "resamplings": result.resamplings,
-        "echoes": result.heard,
-        "log_likelihood": result.log_likelihood,
-        "status": result.status,
-    }
+    """Collect one row per run, with its number."""
+    return {"run": np.arange(len(result.status)), **result.per_run()}
 
 
 def _figure(result: SlatResult, title: str) -> Figure:

@@ -15,6 +15,7 @@ from auvest._core import Status
 from auvest.filters import GaussianFilter
 from auvest.models import MeasurementModel
 
+Float64s = npt.NDArray[np.float64]
 R = TypeVar("R")
 S = TypeVar("S", bound=MeasurementModel)
 
@@ -69,6 +70,37 @@ def only_sensor(
     if len(sensors) != 1 or not isinstance(sensors[0], kind):
         raise ValueError(f"filter must have one {kind.__name__} as its sensor, not {sensors}")
     return sensors[0]
+
+
+def mean_of_rows(values: Float64s) -> Float64s:
+    """Mean of what is known in each row, (runs, steps); NaN where nothing is.
+
+    Sums and a division: a row gives the same bits whichever rows stand beside it.
+    """
+    known = ~np.isnan(values)
+    count = known.sum(axis=1)
+    total = np.where(known, values, 0.0).sum(axis=1)
+    mean: Float64s = np.full(len(values), np.nan)
+    np.divide(total, count, out=mean, where=count > 0)
+    return mean
+
+
+def nees_of_plane(error: Float64s, covariance: Float64s) -> Float64s:
+    """Normalised error squared of a position, (..., 2) and (..., 2, 2), in closed form.
+
+    The same bits everywhere, as :func:`auvest.metrics.nees` with its solver has not. Infinite where
+    the covariance is zero.
+    """
+    e, p = error, covariance
+    determinant = p[..., 0, 0] * p[..., 1, 1] - p[..., 0, 1] ** 2
+    square = (
+        e[..., 0] ** 2 * p[..., 1, 1]
+        - 2 * e[..., 0] * e[..., 1] * p[..., 0, 1]
+        + e[..., 1] ** 2 * p[..., 0, 0]
+    )
+    nees: Float64s = np.full(square.shape, np.inf)
+    np.divide(square, determinant, out=nees, where=~(determinant <= 0))
+    return nees
 
 
 def standard_error(per_run: Floats) -> float:

@@ -31,7 +31,14 @@ from auvest._fields import (
 from auvest.filters import Ekf, RobustEkf, RobustUkf, Ukf
 from auvest.kernels import Kernel, KernelName, RejectionStreak
 from auvest.models import LeaderRange, SpeedHeading
-from auvest.simulation._runs import Runs, collect, only_sensor, standard_error
+from auvest.simulation._runs import (
+    Runs,
+    collect,
+    mean_of_rows,
+    nees_of_plane,
+    only_sensor,
+    standard_error,
+)
 
 _DEFAULTS = _core.cooperative_defaults()
 _STREAK = RejectionStreak()
@@ -185,6 +192,20 @@ class Result(Runs):
         square = np.square(self.error).sum(axis=-1)
         return np.array([np.sqrt(row[~np.isnan(row)].mean()) for row in square])
 
+    def per_run(self) -> dict[str, npt.NDArray[Any]]:
+        """Collect one row per run: error, consistency and what became of the ranges."""
+        return {
+            "rmse_m": np.sqrt(mean_of_rows(np.square(self.error).sum(axis=-1))),
+            "nis": mean_of_rows(self.nis),
+            "nees": mean_of_rows(nees_of_plane(self.error, self.covariance)),
+            "weight": mean_of_rows(self.weight),
+            "taken": self.taken,
+            "recoveries": self.recoveries,
+            "too_late": self.too_late,
+            "lost": self.lost,
+            "status": self.status,
+        }
+
     @property
     def rmse_standard_error_m(self) -> float:
         """Standard error of ``rmse_m``, m; NaN for one run."""
@@ -255,6 +276,7 @@ def simulate(
     filter: Ekf | Ukf,  # noqa: A002 (its name in this package)
     scenario: Scenario = _SCENARIO,
     *,
+    first: int = 0,
     workers: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Result:
@@ -267,6 +289,9 @@ def simulate(
         :class:`auvest.LeaderRange`: its models, kernel and belief are the start of every run. It is
         not changed. Its noise need not be the true noise.
     scenario : Scenario
+    first : int
+        Number of the first run, whose stream of the seed it draws from: runs done in several calls
+        are those of one call, bit for bit.
     workers : int, optional
         Threads, 1 to 256; default: one per processor. The result does not depend on it.
     progress : callable, optional
@@ -297,6 +322,7 @@ def simulate(
         partial(Result, scenario=scenario),
         part,
         scenario.runs,
+        first=first,
         chunk=montecarlo.chunk_for(scenario.runs, scenario.steps, workers),
         workers=workers,
         progress=progress,

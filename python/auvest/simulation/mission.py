@@ -261,6 +261,14 @@ class MissionResult:
         failed: npt.NDArray[np.bool_] = (self.status != int(Status.ok)) | ~self.finished
         return failed
 
+    def per_run(self) -> dict[str, npt.NDArray[Any]]:
+        """Collect one row per run: what has one number for each."""
+        return {
+            entry.name: getattr(self, entry.name)
+            for entry in fields(self)
+            if entry.name != "mission" and getattr(self, entry.name).ndim == 1
+        }
+
     @property
     def time_s(self) -> Floats:
         """Time of the kept steps, s, shape (T,)."""
@@ -271,6 +279,7 @@ def simulate(
     mission: Mission,
     *,
     record: bool = True,
+    first: int = 0,
     workers: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> MissionResult:
@@ -282,6 +291,9 @@ def simulate(
         What is flown.
     record : bool
         Whether every step is kept, not the numbers of each run alone.
+    first : int
+        Number of the first run, whose stream of the seed it draws from: runs done in several calls
+        are those of one call, bit for bit.
     workers : int, optional
         Threads; default: one per processor. The result does not depend on it.
     progress : callable, optional
@@ -324,6 +336,7 @@ def simulate(
         columns = montecarlo.run(
             part,
             runs=mission.runs,
+            first=first,
             chunk=montecarlo.chunk_for(mission.runs, max(rows, 1000), workers),
             workers=workers,
             progress=progress,

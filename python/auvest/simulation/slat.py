@@ -28,7 +28,7 @@ from auvest._fields import (
     number,
     positive,
 )
-from auvest.simulation._runs import Runs, collect, standard_error
+from auvest.simulation._runs import Runs, collect, nees_of_plane, standard_error
 from auvest.slat import MAX_MASTERS, DeadReckoning, EkfSlat, Slatf, SlatFilter, SlatfJoint
 from auvest.slat.models import CompassMotion, Sonar, core_sonar
 
@@ -255,16 +255,19 @@ class SlatResult(Runs):
 
         Infinite where all particles stand in one place: they claim a covariance of zero.
         """
-        e, p = self.error, self.covariance
-        determinant = p[..., 0, 0] * p[..., 1, 1] - p[..., 0, 1] ** 2
-        square = (
-            e[..., 0] ** 2 * p[..., 1, 1]
-            - 2 * e[..., 0] * e[..., 1] * p[..., 0, 1]
-            + e[..., 1] ** 2 * p[..., 0, 0]
-        )
-        nees: Floats = np.full(square.shape, np.inf)
-        np.divide(square, determinant, out=nees, where=~(determinant <= 0))
-        return nees
+        return nees_of_plane(self.error, self.covariance)
+
+    def per_run(self) -> dict[str, npt.NDArray[Any]]:
+        """Collect one row per run."""
+        return {
+            "rmse_m": self.run_rmse_m,
+            "mean_error_m": np.nanmean(self.distance_m, axis=1),
+            "end_error_m": self.distance_m[:, -1],
+            "resamplings": self.resamplings,
+            "echoes": self.heard,
+            "log_likelihood": self.log_likelihood,
+            "status": self.status,
+        }
 
     @property
     def covered(self) -> float:
@@ -278,6 +281,7 @@ def simulate(
     filter: SlatFilter,  # noqa: A002 (its name in this package)
     scenario: SlatScenario = _SCENARIO,
     *,
+    first: int = 0,
     workers: int | None = None,
     progress: Callable[[int, int], None] | None = None,
     store: Path | None = None,
@@ -292,6 +296,9 @@ def simulate(
         not changed. Its motion must be a :class:`auvest.CompassMotion`, whose noise need not be the
         true one (:attr:`SlatScenario.motion` is), nor that of its sonar.
     scenario : SlatScenario
+    first : int
+        Number of the first run, whose stream of the seed it draws from: runs done in several calls
+        are those of one call, bit for bit.
     workers : int, optional
         Threads, 1 to 256; default: one per processor. The result does not depend on it.
     progress : callable, optional
@@ -333,6 +340,7 @@ def simulate(
         partial(SlatResult, **true, scenario=scenario),
         part,
         scenario.runs,
+        first=first,
         chunk=max(1, min(5, 500_000 // scenario.pings)),
         workers=workers,
         progress=progress,

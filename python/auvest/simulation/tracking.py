@@ -32,7 +32,7 @@ from auvest._fields import (
 from auvest.filters import Ekf, Ukf
 from auvest.intervals import FixedInterval
 from auvest.models import ConstantAcceleration, RangeBearing
-from auvest.simulation._runs import Runs, collect, only_sensor
+from auvest.simulation._runs import Runs, collect, mean_of_rows, nees_of_plane, only_sensor
 
 _TRACK = _core.track_defaults()
 _NOISE = _core.noise_defaults()
@@ -238,6 +238,18 @@ class TrackingResult(Runs):
         """Normalised position error squared, shape (runs, steps); 2 degrees of freedom."""
         return metrics.nees(self.error, self.position_covariance)
 
+    def per_run(self) -> dict[str, npt.NDArray[Any]]:
+        """Collect one row per run: error, consistency and interval, means over its samples."""
+        error = self.error
+        return {
+            "rmse_m": np.sqrt(mean_of_rows(np.square(error).sum(axis=-1))),
+            "nis": mean_of_rows(self.nis),
+            "nees": mean_of_rows(nees_of_plane(error, self.position_covariance)),
+            "interval_s": mean_of_rows(self.interval_s),
+            "samples": self.samples,
+            "status": self.status,
+        }
+
     @property
     def mean_interval_s(self) -> float:
         """Time simulated per sample taken, s."""
@@ -264,6 +276,7 @@ def simulate(
     filter: Ekf | Ukf,  # noqa: A002 (its name in this package)
     scenario: Scenario = _SCENARIO,
     *,
+    first: int = 0,
     workers: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> TrackingResult:
@@ -277,6 +290,9 @@ def simulate(
         station; its noise need not be the true noise.
     scenario : Scenario
         Track, noise, number of runs and so on.
+    first : int
+        Number of the first run, whose stream of the seed it draws from: runs done in several calls
+        are those of one call, bit for bit.
     workers : int, optional
         Threads, 1 to 256; default: one per processor. The result does not depend on it.
     progress : callable, optional
@@ -306,6 +322,7 @@ def simulate(
         partial(TrackingResult, scenario=scenario),
         part,
         scenario.runs,
+        first=first,
         chunk=montecarlo.chunk_for(scenario.runs, scenario.steps, workers),
         workers=workers,
         progress=progress,
