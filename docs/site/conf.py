@@ -41,7 +41,8 @@ exclude_patterns = [".*", "build", "dist", "cpp", "python", "tests", "auvest-out
 myst_enable_extensions = ["dollarmath"]
 myst_fence_as_directive = ["math"]  # as GitHub has them
 myst_heading_anchors = 4
-suppress_warnings = ["myst.header"]  # pages may begin with what is no heading
+# Pages may begin with what is no heading; attributes of several classes have one name.
+suppress_warnings = ["myst.header", "ref.python"]
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"  # the docstrings have them

@@ -8,7 +8,8 @@ The blocks of a page are those of its Markdown, which GitHub shows as well:
 - `<!-- picture: NAME -->`: a picture that a command has left is shown there;
 - `<!-- no-run: WHY -->`: the block is only shown, and a test runs it.
 
-`$AUVEST_SOURCE` is the folder of the repository. Other languages are only shown. A block that fails ends the build, with page and line.
+`$AUVEST_SOURCE` is the folder of the repository. Other languages are only shown. A block that fails
+ends the build, with page and line.
 """
 
 from __future__ import annotations
@@ -25,8 +26,9 @@ from pathlib import Path
 
 from docutils import nodes
 from sphinx.application import Sphinx
-from sphinx.errors import SphinxError
+from sphinx.util import logging
 
+LOGGER = logging.getLogger(__name__)
 FOLDER = "docs/tutorials/"
 FENCE = re.compile(
     r"(?:^<!-- (?P<mark>file|no-run): (?P<what>[^\n]*) -->\n)?"
@@ -65,8 +67,8 @@ def blocks_of(text: str) -> list[Block]:
     ]
 
 
-def run(page: str, blocks: list[Block], folder: Path) -> list[dict[str, object]]:
-    """Run those blocks in a folder; return what each printed and drew."""
+def run(page: str, blocks: list[Block], folder: Path) -> list[dict[str, object]] | str:
+    """Run those blocks in a folder; return what each printed and drew, or what went wrong."""
     task = {"page": page, "blocks": [vars(block) for block in blocks]}
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     done = subprocess.run(
@@ -75,9 +77,7 @@ def run(page: str, blocks: list[Block], folder: Path) -> list[dict[str, object]]
         env={**os.environ, "PATH": path, "COLUMNS": "100", "NO_COLOR": "1",
              "AUVEST_SOURCE": str(RUN.parents[2])},
     )  # fmt: skip
-    if done.returncode != 0:
-        raise SphinxError(f"{done.stderr}\n{page}: its code fails")
-    return json.loads(done.stdout)
+    return json.loads(done.stdout) if done.returncode == 0 else done.stderr.strip()
 
 
 def image(data: bytes | str, what: str) -> nodes.raw:
@@ -96,9 +96,14 @@ def execute(app: Sphinx, doctree: nodes.document) -> None:
     blocks = blocks_of((Path(app.srcdir) / page).read_text(encoding="utf-8"))
     shown = list(doctree.findall(nodes.literal_block))
     if [node.rawsource for node in shown] != [block.code for block in blocks]:
-        raise SphinxError(f"{page}: its blocks are not those that Sphinx sees")
+        LOGGER.warning("its blocks are not those that Sphinx sees", location=name)
+        return
     with tempfile.TemporaryDirectory() as folder:
-        results = iter(run(page, [block for block in blocks if block.runs], Path(folder)))
+        ran = run(page, [block for block in blocks if block.runs], Path(folder))
+        if isinstance(ran, str):
+            LOGGER.warning("%s", ran, location=name)
+            return
+        results = iter(ran)
         for node, block in zip(shown, blocks, strict=True):
             if not block.runs:
                 continue

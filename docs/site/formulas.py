@@ -10,6 +10,7 @@ import base64
 import json
 import re
 from functools import cache
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,9 @@ import quickjs
 from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.errors import SphinxError
+from sphinx.util import logging
 
+LOGGER = logging.getLogger(__name__)
 KATEX = Path("/usr/share/javascript/katex")
 RENDER = """
 function render(text, display) {
@@ -44,8 +47,8 @@ def html(node: nodes.Element, text: str, *, display: bool) -> str:
     try:
         return json.loads(renderer()(text, display))
     except quickjs.JSException as error:
-        first = str(error).splitlines()[0]
-        raise SphinxError(f"{node.source}:{node.line}: {first}") from None
+        LOGGER.warning("%s", str(error).splitlines()[0], location=node)
+        return escape(text)
 
 
 def inline(translator: Any, node: nodes.math) -> None:

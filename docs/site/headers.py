@@ -34,7 +34,11 @@ NOISE = {"using_declaration", "friend_declaration", "static_assert_declaration"}
 
 def read(header: Path) -> str:
     """Return a header without the macros that only tell a compiler how to lay out code."""
-    return re.sub(r"\bAUVEST_(?:INLINE|OUTLINE(?:_HOT)?|ALWAYS_INLINE|COLD|UNROLL)\b *", "", header.read_text(encoding="utf-8"))
+    return re.sub(
+        r"\bAUVEST_(?:INLINE|OUTLINE(?:_HOT)?|ALWAYS_INLINE|COLD|UNROLL)\b *",
+        "",
+        header.read_text(encoding="utf-8"),
+    )
 
 
 def tree_of(text: str) -> Node:
@@ -115,7 +119,7 @@ def interface(node: Node, text: bytes) -> str:
     shown = re.sub(r"\n(?:\s*\n)?(?: *public:\n)?(?:\s*\n)?( *\})", r"\n\1", shown)
     shown = re.sub(r"\{\s*(?:public:)?\s*\}", "{}", shown)
     indent = b" " * node.start_point[1]
-    return textwrap.dedent((indent.decode() + shown)).strip()
+    return textwrap.dedent(indent.decode() + shown).strip()
 
 
 class Entry:
@@ -179,7 +183,7 @@ def prose(text: str) -> list[nodes.Node]:
     """Return a comment as paragraphs; what is indented by four stands as it is."""
     shown: list[nodes.Node] = []
     for part in re.split(r"\n\s*\n", text):
-        if all(line.startswith("    ") for line in part.splitlines()):
+        if part.strip() and all(line.startswith("    ") for line in part.splitlines()):
             code = textwrap.dedent(part)
             shown.append(nodes.literal_block(code, code, language="none"))
         elif part.strip():
@@ -230,7 +234,9 @@ class CppHeaders(SphinxDirective):
                 functions.append(f"{comment}\n{entry.code}")
         if functions:
             section.insert(
-                next((k for k, n in enumerate(section) if isinstance(n, nodes.section)), len(section)),
+                next(
+                    (k for k, n in enumerate(section) if isinstance(n, nodes.section)), len(section)
+                ),
                 code_block("\n\n".join(functions)),
             )
         return section

@@ -14,6 +14,7 @@ import json
 import re
 import subprocess
 import sys
+import traceback
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,7 @@ COMMAND = re.compile(r"^\$ ((?:.*\\\n)*.*)$", re.MULTILINE)
 
 def run_python(code: str, line: int, page: str, names: dict[str, Any]) -> str:
     """Return what a block prints, and the value of its last line if that is an expression."""
-    tree = ast.increment_lineno(ast.parse(code, page), line - 1)
+    tree = ast.parse("\n" * (line - 1) + code, page)
     shown = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
@@ -63,13 +64,21 @@ def pictures() -> list[str]:
     return drawn
 
 
+def line_of(error: Exception, page: str) -> int | None:
+    """Return the line of the page at which its code failed, if it was the code."""
+    if isinstance(error, SyntaxError) and error.filename == page:
+        return error.lineno
+    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__)
+             if frame.filename == page]  # fmt: skip
+    return lines[-1] if lines else None
+
+
 def main() -> None:
     """Read the page's blocks from standard input and write what became of them."""
     task = json.load(sys.stdin)
     names: dict[str, Any] = {"__name__": "__main__"}
     results = []
     for block in task["blocks"]:
-        where = f"{task['page']}:{block['line']}"
         result: dict[str, Any] = {"text": "", "pictures": []}
         try:
             if block["file"]:
@@ -82,7 +91,8 @@ def main() -> None:
             else:
                 result["text"] = run_console(block["code"])
         except Exception as error:
-            sys.exit(f"{where}: {type(error).__name__}: {error}")
+            line = line_of(error, task["page"]) or block["line"]
+            sys.exit(f"{task['page']}:{line}: {type(error).__name__}: {error}")
         results.append(result)
     json.dump(results, sys.__stdout__)
 
