@@ -97,6 +97,7 @@ reproduce: install ## every table and figure of the papers, beside ours
 	$(VENV)/bin/auvest reproduce mekf
 
 docs: install-editable ## the documentation site in build/site: tutorials are run, links checked
+	rm -rf build/docs build/site
 	$(PY) -m sphinx -b html -W --keep-going -q -j 2 -d build/docs -c docs/site . build/site
 	@echo build/site/index.html
 
