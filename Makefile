@@ -21,7 +21,7 @@ FIRMWARE_PACKAGES := arduino-builder arduino-core-avr gcc-avr avr-libc binutils-
     gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib qemu-system-arm \
     gcc-riscv64-unknown-elf picolibc-riscv64-unknown-elf qemu-system-misc
 DEV_PACKAGES := $(PACKAGES) $(FIRMWARE_PACKAGES) \
-    clang libclang-rt-dev doctest-dev clang-format valgrind chromium
+    clang libclang-rt-dev doctest-dev clang-format valgrind chromium libjs-katex
 
 CXX_FILES = $(shell find cpp firmware tests -name '*.hpp' -o -name '*.cpp' -o -name '*.h')
 # What the Python module is compiled from.
@@ -74,7 +74,7 @@ lock: setup ## renew tests/requirements.lock: the newest packages within the bou
 	printf '%s\n' $(foreach r,$(BUILD_REQUIRES),'$(r)') > build/lock/build.in
 	build/lock/bin/uv pip compile --quiet --upgrade --universal --python-version 3.10 \
 	    --generate-hashes --no-annotate --custom-compile-command 'make lock' \
-	    --extra test --extra dev --output-file tests/requirements.lock pyproject.toml build/lock/build.in
+	    --extra test --extra dev --extra docs --output-file tests/requirements.lock pyproject.toml build/lock/build.in
 
 $(VENV)/.auvest-normal: $(VENV)/.auvest-build-requires $(CORE_FILES) $(shell find python -name '*.py' -o -name '*.pyi')
 	$(PIP_INSTALL) --no-build-isolation .
@@ -86,7 +86,7 @@ $(VENV)/.auvest-editable: $(VENV)/.auvest-setup-dev $(CORE_FILES)
 
 # ---- Use -----------------------------------------------------------------------------------------
 
-.PHONY: demo reproduce wheel library
+.PHONY: demo reproduce docs wheel library
 demo: install ## install and run the first two simulations: tables and the paths of figures
 	$(VENV)/bin/auvest simulate aukf
 	$(VENV)/bin/auvest simulate slatf
@@ -95,6 +95,11 @@ reproduce: install ## every table and figure of the papers, beside ours
 	$(VENV)/bin/auvest reproduce aukf
 	$(VENV)/bin/auvest reproduce slatf
 	$(VENV)/bin/auvest reproduce mekf
+
+docs: install-editable ## the documentation site in build/site: tutorials are run, links checked
+	rm -rf build/docs build/site
+	$(PY) -m sphinx -b html -W --keep-going -q -j 2 -d build/docs -c docs/site . build/site
+	@echo build/site/index.html
 
 wheel: $(VENV)/.auvest-build-requires ## a wheel of the package in dist/
 	$(PY) -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .

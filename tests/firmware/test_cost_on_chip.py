@@ -92,6 +92,15 @@ def test_models_of_ones_own_cost_what_the_built_in_ones_do(measure, root):
     assert mine.difference is built_in.difference is None
     # x, the lower triangle of P, and the interval.
     assert mine.numbers == built_in.numbers == 300 * (6 + 21 + 1)
+    # The tutorial shows what the command has printed for this header.
+    tutorial = (root / "docs" / "tutorials" / "paper_to_chip.md").read_text()
+    command = "$ auvest cost cpp/examples/my_models.hpp --filter aukf\n"
+    shown = tutorial.partition(command)[2].partition("```")[0]
+    for what, name in [("flash", "flash_bytes"), ("static RAM", "static_ram_bytes"),
+                       ("stack", "stack_bytes"), ("a step, median", "cycles_median")]:  # fmt: skip
+        number = re.search(rf"^ {what} +([\d,]+)", shown, re.MULTILINE)[1]
+        assert int(number.replace(",", "")) == pytest.approx(mine.row()[name], rel=0.02), what
+    assert f"every bit: {mine.numbers:,} numbers" in shown
 
 
 def test_the_figures_are_those_of_the_budgets(measure, root):

@@ -42,7 +42,7 @@ def compiles(library, compile_cpp):
     return compiles
 
 
-def test_own_protocol_on_the_board(build_sketch, board, sketches):
+def test_own_protocol_on_the_board(build_sketch, board, sketches, page):
     """The page's words: late ranges, an outlier, a clock that wraps; and it knows where it is."""
     random = np.random.default_rng(3)
     x, y, heading = 12.0, 9.0, 0.3
@@ -57,13 +57,14 @@ def test_own_protocol_on_the_board(build_sketch, board, sketches):
         if k >= 2:  # measured two seconds ago
             range_m = math.dist(places[k - 2], BEACONS[k % 3]) + random.normal(0, 0.5)
             lines.append(f"R,{k % 3},{1000 * (range_m + 40 * (k % 10 == 7)):.0f},2000")
-    reports = []
+    reports, answers = [], {}
     with board(build_sketch(sketches[0]).elf, limit_s=30.0) as running:
         for k, line in enumerate(lines):
             running.send(line, delay_s=0.1 + 0.02 * k if k < 4 else 0.02 + 0.02 * (line[0] == "R"))
             if line.startswith("R"):
                 text = next(event.text for event in running if isinstance(event, SerialLine))
                 assert text.startswith("P,")
+                answers[line] = text
                 reports.append([int(cell) for cell in text.split(",")[1:]])
     found = np.array(reports)
     error_m = np.hypot(*(found[:, :2] / 100 - np.array(places)[2:]).T)
@@ -73,6 +74,10 @@ def test_own_protocol_on_the_board(build_sketch, board, sketches):
     assert found[~outliers, 3].mean() > 90
     assert error_m[20:].max() < 1.5  # 3 sigma of one range
     assert (found[20:, 2] < 60).all()
+    # Ranges and what the sketch answers are those that the page shows.
+    shown = dict(re.findall(r"^(R,\S+) +-> +(P,\S+)", page, re.MULTILINE))
+    assert len(shown) == 6
+    assert shown.items() <= answers.items(), answers
 
 
 def test_each_filter_of_the_table_takes_one_line(compiles, sketches, page):

@@ -4,6 +4,9 @@
 - ```cpp blocks with an `int main` are compiled as C++11 with warnings as errors, and run;
 - ```console blocks: of each line `$ auvest ...` the CLI must accept the arguments.
 
+The blocks of docs/tutorials build on each other: the documentation site runs them
+(docs/site/executed.py), and ends where one fails.
+
 `<!-- no-test -->` on the line before a python or cpp block says that it is a fragment.
 """
 
@@ -27,7 +30,9 @@ BLOCK = re.compile(
 def blocks(language):
     """Return the blocks of one language as pytest parameters named file:line."""
     readmes = [ROOT / "README.md", ROOT / "firmware" / "README.md"]
-    for page in [*readmes, *sorted((ROOT / "docs").rglob("*.md"))]:
+    pages = sorted((ROOT / "docs").rglob("*.md"))
+    pages = [page for page in pages if page.parent != ROOT / "docs" / "tutorials"]
+    for page in [*readmes, *pages]:
         text = page.read_text()
         for match in BLOCK.finditer(text):
             if match["language"] == language and not match["no_test"]:
