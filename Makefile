@@ -20,7 +20,10 @@ FIRMWARE_PACKAGES := arduino-builder arduino-core-avr gcc-avr avr-libc binutils-
     simavr libsimavr-dev libelf-dev \
     gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib qemu-system-arm \
     gcc-riscv64-unknown-elf picolibc-riscv64-unknown-elf qemu-system-misc
-DEV_PACKAGES := $(PACKAGES) $(FIRMWARE_PACKAGES) \
+# Other packages of Node.js than Debian's bring npm with them, and do not bear Debian's npm beside them.
+NODE_PACKAGES := $(if $(shell command -v npm),,nodejs npm)
+WASM_PACKAGES := lld wasi-libc libclang-rt-14-dev-wasm32 libc++-14-dev-wasm32 $(NODE_PACKAGES)
+DEV_PACKAGES := $(PACKAGES) $(FIRMWARE_PACKAGES) $(WASM_PACKAGES) \
     clang libclang-rt-dev doctest-dev clang-format valgrind chromium libjs-katex
 
 CXX_FILES = $(shell find cpp firmware tests -name '*.hpp' -o -name '*.cpp' -o -name '*.h')

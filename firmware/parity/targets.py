@@ -18,6 +18,7 @@ from firmware import chips
 ROOT = Path(__file__).resolve().parents[2]
 HERE = ROOT / "firmware/parity"
 BENCH = ROOT / "firmware/bench"
+WASM = ROOT / "firmware/wasm"
 INCLUDES = (f"-I{ROOT / 'cpp/include'}", f"-I{ROOT / 'cpp'}", "-I/usr/include/eigen3")
 
 _WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wdouble-promotion", "-Werror")
@@ -27,6 +28,8 @@ _EIGEN = ("-DEIGEN_NO_IO", "-DEIGEN_NO_MALLOC", "-DEIGEN_DONT_VECTORIZE")
 PACKAGES = {
     "g++": "g++",
     "clang++": "clang",
+    "wasm-ld": "lld",
+    "node": "nodejs",
     "avr-g++": "gcc-avr avr-libc",
     **chips.PACKAGES,
 }
@@ -52,9 +55,10 @@ class Target:
         Command of the compiler.
     flags : tuple of str
         Its flags, but for the include paths.
-    machine : {"host", "avr", "mps2-an385", "mps2-an386", "chip"}
-        The computer itself, the simulated ATmega2560 board, a board of QEMU with newlib's files, or
-        that of the chip of this name in :data:`firmware.chips.CHIPS`, without any.
+    machine : {"host", "avr", "mps2-an385", "mps2-an386", "chip", "wasm"}
+        The computer itself, the simulated ATmega2560 board, a board of QEMU with newlib's files,
+        that of the chip of this name in :data:`firmware.chips.CHIPS`, without any, or WebAssembly
+        in node.
     library : tuple of Path
         What the Arduino library compiles beside the headers.
     header : str
@@ -64,14 +68,14 @@ class Target:
     name: str
     compiler: str
     flags: tuple[str, ...]
-    machine: Literal["host", "avr", "mps2-an385", "mps2-an386", "chip"]
+    machine: Literal["host", "avr", "mps2-an385", "mps2-an386", "chip", "wasm"]
     library: tuple[Path, ...] = ()
     header: str = "replay.hpp"
 
     @property
     def sources(self) -> tuple[Path, ...]:
         """What is compiled."""
-        if self.machine in ("avr", "chip"):
+        if self.machine in ("avr", "chip", "wasm"):
             return (HERE / "avr.cpp", *self.library)
         if self.machine == "host":
             return (HERE / "host.cpp",)
@@ -89,6 +93,9 @@ class Target:
         own = [f'-DAUVEST_REPLAY="{self.header}"']
         if self.machine == "avr":
             own += [f"-I{ROOT / 'firmware/board'}", f"-I{ROOT / 'firmware/avr_std'}"]
+        if self.machine == "wasm":
+            require("wasm-ld")
+            own.append(f"-I{WASM}")
         if self.machine == "chip":
             flags = (*self.flags, *extra, *own, f"-I{ROOT / 'cpp'}")
             try:
@@ -130,6 +137,9 @@ class Target:
         elif self.machine == "avr":
             command = [str(board), "--input", files[0], "--output", files[1]]
             command += ["--limit", str(_LIMIT_S), str(program)]
+        elif self.machine == "wasm":
+            require("node")
+            command = ["node", str(WASM / "replay.mjs"), str(program), *files]
         else:
             require("qemu-system-arm")
             command = hil.qemu(self.machine, program, files)
@@ -176,6 +186,15 @@ def _cortex(name: str) -> Target:
     return Target(name, "arm-none-eabi-g++", common, machine)
 
 
+def _wasm(name: str, *flags: str) -> Target:
+    common = ("--target=wasm32-wasi", "-O2", "-std=c++11", "-ffp-contract=off", *_EIGEN, *flags)
+    # Without assertions, which would print: then the host gives the program nothing but board.hpp.
+    common += ("-DEIGEN_NO_DEBUG", "-fno-exceptions", "-fno-rtti", *_WARNINGS)
+    # A function that is called, not a command that begins and ends: so no arguments, files or exit.
+    common += ("-mexec-model=reactor", "-Wl,--export=main", "-Wl,-z,stack-size=1048576")
+    return Target(name, "clang++", common, "wasm")
+
+
 TARGETS = (
     _host("g++", "-O0"),
     _host("g++", "-O3", "-march=native"),
@@ -192,6 +211,7 @@ TARGETS = (
     _avr("atmega2560-O2", "-O2"),
     _cortex("cortex-m4f"),
     _cortex("cortex-m3"),
+    _wasm("wasm32"),
 )
 
 
@@ -222,15 +242,20 @@ def _slat(target: Target, name: str = "", *flags: str) -> Target:
     return replace(target, name=target.name + name, flags=flags, header="slatf_replay.hpp")
 
 
-#: The same for the filters that localise and track; on the host SLATF 1.0 and 2.0 also in lanes: of
-#: SSE2, and of the widest set that there is. (gcc's lanes against its scalar code: tests/cpp/simd.)
+#: The lanes of a target in which SLATF 1.0 and 2.0 run, too: of SSE2, and of the widest set that
+#: there is; of WebAssembly. (gcc's lanes against its scalar code: tests/cpp/simd.)
+LANES = {
+    "clang-O3-march=native": (("sse2",), ("default_arch",)),
+    "wasm32": (("wasm", "-msimd128"),),
+}
+
+#: The same for the filters that localise and track.
 SLATF_TARGETS = (
     *map(_slat, TARGETS),
     *(
-        _slat(target, f"-{lanes}", f"-DAUVEST_LANES={lanes}", "-DAUVEST_KINDS=0xf")
+        _slat(target, f"-{lanes}", f"-DAUVEST_LANES={lanes}", "-DAUVEST_KINDS=0xf", *flags)
         for target in TARGETS
-        if target.name == "clang-O3-march=native"
-        for lanes in ("sse2", "default_arch")
+        for lanes, *flags in LANES.get(target.name, ())
     ),
 )
 
@@ -251,5 +276,5 @@ LAG = 12
 SMOOTHER_TARGETS = tuple(
     replace(target, header="smoother_replay.hpp")
     for target in TARGETS
-    if target.name in ("gcc-O3-march=native", "atmega2560-ide", "cortex-m4f")
+    if target.name in ("gcc-O3-march=native", "atmega2560-ide", "cortex-m4f", "wasm32")
 )

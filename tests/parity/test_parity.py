@@ -148,6 +148,10 @@ BROKEN = {
     "reordered by avr-gcc": (
         *("atmega2560-O2", SelfTestPart.expression, "-funsafe-math-optimizations"),
     ),
+    "reordered in WebAssembly": (
+        *("wasm32", SelfTestPart.expression, "-funsafe-math-optimizations"),
+    ),
+    "libm of wasi-libc": ("wasm32", SelfTestPart.math, LIBM),
     "without NaN by clang": (CLANG, SelfTestPart.expression, "-fno-honor-nans"),
     "without signs of zeros": (GCC, SelfTestPart.expression, "-fno-signed-zeros"),
 }

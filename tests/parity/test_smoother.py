@@ -7,6 +7,7 @@ import pytest
 
 import auvest
 from firmware.parity.targets import LAG, SMOOTHER_TARGETS
+from tests.slow import SLOW
 
 STEP = np.dtype(
     [("measured", "<u4"), ("dt", "<f4"), ("input", "<f4", 3), ("z", "<f4"), ("leader", "<f4", 2)]
@@ -60,7 +61,13 @@ def as_bits(values: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(values, "<f4").view("<u4").reshape(len(values), -1)
 
 
-@pytest.mark.parametrize("target", SMOOTHER_TARGETS, ids=lambda target: target.name)
+def targets():
+    for target in SMOOTHER_TARGETS:
+        marks = SLOW if target.machine == "wasm" else ()
+        yield pytest.param(target, id=target.name, marks=marks)
+
+
+@pytest.mark.parametrize("target", list(targets()))
 def test_every_target_gives_the_bits_of_python(target, replay):
     steps = record()
     head = np.array([len(steps)], "<u4").tobytes() + X0.tobytes() + P0.tobytes()
