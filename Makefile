@@ -45,9 +45,12 @@ apt = missing=$$(comm -23 <(tr ' ' '\n' <<< "$(1)" | sort) \
 	        apt-get install -qy --no-install-recommends $$missing; \
 	fi
 
+# $(call listed,NAME): the packages of a list in pyproject.toml.
+listed = $(shell sed -nE 's/^$(1) = \[(.*)\]/\1/p' pyproject.toml | tr -d '",')
+
 # The build requirements of pyproject.toml live in the environment: an isolated build would bring
 # pybind11 to a new place each time and compile everything again.
-BUILD_REQUIRES = $(shell sed -nE 's/^requires = \[(.*)\]/\1/p' pyproject.toml | tr -d '",')
+BUILD_REQUIRES = $(call listed,requires)
 PIP_INSTALL = $(PY) -m pip install --quiet --disable-pip-version-check
 
 # Users get the newest packages within the bounds of pyproject.toml; tests and linters run with those
@@ -72,12 +75,17 @@ $(VENV)/.auvest-build-requires: $(VENV)/.auvest-setup
 	$(PIP_INSTALL) $(foreach r,$(BUILD_REQUIRES),'$(r)')
 	touch $@
 
+$(VENV)/.auvest-release: $(VENV)/.auvest-build-requires
+	$(PIP_INSTALL) $(foreach r,$(call listed,release),'$(r)')
+	touch $@
+
 lock: setup ## renew tests/requirements.lock: the newest packages within the bounds of pyproject.toml
 	test -x build/lock/bin/uv || { python3 -m venv build/lock && build/lock/bin/pip install -q uv; }
 	printf '%s\n' $(foreach r,$(BUILD_REQUIRES),'$(r)') > build/lock/build.in
 	build/lock/bin/uv pip compile --quiet --upgrade --universal --python-version 3.10 \
 	    --generate-hashes --no-annotate --custom-compile-command 'make lock' \
-	    --extra test --extra dev --extra docs --output-file tests/requirements.lock pyproject.toml build/lock/build.in
+	    --extra test --extra dev --extra docs --extra release \
+	    --output-file tests/requirements.lock pyproject.toml build/lock/build.in
 
 $(VENV)/.auvest-normal: $(VENV)/.auvest-build-requires $(CORE_FILES) $(shell find python -name '*.py' -o -name '*.pyi')
 	$(PIP_INSTALL) --no-build-isolation .
@@ -89,7 +97,7 @@ $(VENV)/.auvest-editable: $(VENV)/.auvest-setup-dev $(CORE_FILES)
 
 # ---- Use -----------------------------------------------------------------------------------------
 
-.PHONY: demo reproduce docs wheel library
+.PHONY: demo reproduce docs wheel library release
 demo: install ## install and run the first two simulations: tables and the paths of figures
 	$(VENV)/bin/auvest simulate aukf
 	$(VENV)/bin/auvest simulate slatf
@@ -110,6 +118,20 @@ wheel: $(VENV)/.auvest-build-requires ## a wheel of the package in dist/
 
 library: install ## the Arduino library: a zip in dist/
 	mkdir -p dist && $(VENV)/bin/auvest library --output dist
+
+# All of them are made anew, so that nothing older is among the checksums. Wheels for further Pythons,
+# each compiled from nothing: make release PYTHONS="python3.12 python3.13"
+RELEASE_PARTS := wheel library $(shell sed -nE 's/^(docs|page):.*/\1/p' Makefile)
+PYTHONS :=
+release: $(VENV)/.auvest-release ## all that is published, in dist/: wheel, sdist, library, checksums
+	rm -rf dist
+	$(PY) -m build --sdist --no-isolation --outdir dist .
+	$(MAKE) $(RELEASE_PARTS)
+	for python in $(PYTHONS); do \
+	    $$python -m pip wheel --quiet --no-deps --wheel-dir dist dist/auvest-*.tar.gz; \
+	done
+	$(PY) python/release.py dist
+	@cat dist/SHA256SUMS
 
 # The simulated board, and the sketch tracking_loop compiled for it.
 .PHONY: board capture

@@ -6,7 +6,12 @@ import sys
 from pathlib import Path
 
 _PACKAGE = Path(__file__).resolve().parent
-_EIGEN = (Path("/usr/include/eigen3"), Path("/usr/local/include/eigen3"))
+#: The first one comes with a source distribution.
+_EIGEN = (
+    _PACKAGE.parents[1] / "cpp" / "vendored",
+    Path("/usr/include/eigen3"),
+    Path("/usr/local/include/eigen3"),
+)
 
 
 def get_include() -> str:
@@ -30,15 +35,20 @@ def include_folders(*, sources_first: bool = False) -> list[Path]:
     and the tree may have been edited since.
     """
     cpp = _PACKAGE.parents[1] / "cpp"
-    found = [folder for folder in _EIGEN if (folder / "Eigen" / "Core").is_file()]
-    sources = [cpp, cpp / "include", found[0]] if (cpp / "desk").is_dir() and found else []
+    eigen = eigen_folder()
+    sources = [cpp, cpp / "include", eigen] if (cpp / "desk").is_dir() and eigen else []
     installed = _installed()
     if sources and (sources_first or installed is None):
         return sources
     if installed is None:
-        what = "Eigen here: install libeigen3-dev" if not found else "headers here: install it anew"
+        what = "headers here: install it anew" if eigen else "Eigen here: install libeigen3-dev"
         raise FileNotFoundError(f"auvest has no {what}")
     return [installed]
+
+
+def eigen_folder() -> Path | None:
+    """Give the folder in which Eigen's headers are on this computer."""
+    return next((folder for folder in _EIGEN if (folder / "Eigen" / "Core").is_file()), None)
 
 
 def firmware_folder() -> Path:

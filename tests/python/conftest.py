@@ -1,7 +1,9 @@
 """What several test files share."""
 
+import os
 import signal
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -13,6 +15,35 @@ ROOT = Path(__file__).resolve().parents[2]
 def root() -> Path:
     """Return the top of the source tree."""
     return ROOT
+
+
+@pytest.fixture(scope="session")
+def wheel(tmp_path_factory):
+    """Return the path of a fresh wheel; compiled objects of earlier builds are reused."""
+    folder = tmp_path_factory.mktemp("wheel")
+    command = [sys.executable, "-m", "pip", "wheel", "--no-deps", "--no-build-isolation", ROOT]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    (wheel,) = folder.glob("*.whl")
+    return wheel
+
+
+@pytest.fixture(scope="session")
+def sdist(tmp_path_factory):
+    """Return the path of a fresh source distribution, of a checkout with a stray file."""
+    stray = ROOT / "python" / "auvest" / "left [over] by someone.txt"
+    code = "import backend, sys; print(backend.build_sdist(sys.argv[1]))"
+    folder = tmp_path_factory.mktemp("sdist")
+    stray.write_text("not tracked, not ignored")
+    try:
+        environment = {**os.environ, "PYTHONPATH": str(ROOT / "python")}
+        command = [sys.executable, "-c", code, folder]
+        done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
+    finally:
+        stray.unlink()
+    assert done.returncode == 0, done.stdout + done.stderr
+    (sdist,) = folder.glob("*.tar.gz")
+    return sdist
 
 
 @pytest.fixture

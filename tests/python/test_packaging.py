@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tarfile
 import zipfile
+from email.parser import HeaderParser
 from importlib.metadata import version
 
 import pytest
@@ -15,23 +16,29 @@ import pytest
 import auvest
 from auvest.firmware import package
 
+CODE = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
+
+
+def files_of(sdist, folder=""):
+    """Return the files of a source distribution by name, or those below a folder by name in it."""
+    with tarfile.open(sdist) as archive:
+        files = {
+            member.name.split("/", 1)[1]: archive.extractfile(member).read()
+            for member in archive.getmembers()
+            if member.isfile()
+        }
+    return {
+        name.removeprefix(folder): content
+        for name, content in files.items()
+        if name.startswith(folder)
+    }
+
 
 @pytest.fixture(scope="module")
 def declared_version(root):
     """Return the version that pyproject.toml declares."""
     text = (root / "pyproject.toml").read_text()
     return re.search(r'^version = "(.+)"$', text, re.MULTILINE)[1]
-
-
-@pytest.fixture(scope="module")
-def wheel(root, tmp_path_factory):
-    """Return the path of a fresh wheel; compiled objects of earlier builds are reused."""
-    folder = tmp_path_factory.mktemp("wheel")
-    command = [sys.executable, "-m", "pip", "wheel", "--no-deps", "--no-build-isolation", root]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout + done.stderr
-    (wheel,) = folder.glob("*.whl")
-    return wheel
 
 
 def test_version_has_one_source(declared_version, wheel):
@@ -163,21 +170,62 @@ def test_wheel_outside_the_source_tree(wheel, declared_version, tmp_path, run):
     assert library == hashlib.sha256(package.archive()).hexdigest()
 
 
-def test_sdist_has_what_git_tracks(root, tmp_path, declared_version, run):
-    """No more, whatever lies about in the checkout, and no less."""
-    stray = root / "python" / "auvest" / "left [over] by someone.txt"
-    code = "import backend, sys; print(backend.build_sdist(sys.argv[1]))"
-    stray.write_text("not tracked, not ignored")
-    try:
-        environment = {**os.environ, "PYTHONPATH": str(root / "python")}
-        run(sys.executable, "-c", code, tmp_path, cwd=root, env=environment)
-    finally:
-        stray.unlink()
-    with tarfile.open(tmp_path / f"auvest-{declared_version}.tar.gz") as archive:
-        files = [member.name for member in archive.getmembers() if member.isfile()]
-    names = {name.split("/", 1)[1] for name in files}
+def test_sdist_has_what_git_tracks(root, sdist, run):
+    """No more, whatever lies about in the checkout, and no less; headers of others beside it."""
+    names = files_of(sdist)
     tracked = set(run("git", "ls-files", "-z", cwd=root).split("\0")) - {"", ".ci/run"}
-    assert names - {"PKG-INFO"} == {name for name in tracked if (root / name).exists()}
+    own = {name for name in names if not name.startswith("cpp/vendored/")}
+    assert own - {"PKG-INFO"} == {name for name in tracked if (root / name).exists()}
+
+
+def test_sdist_has_the_headers_that_the_wheel_ships(sdist, wheel):
+    """Of Eigen the same ones, which are under licences that allow it; and those of xsimd."""
+    brought = files_of(sdist, "cpp/vendored/")
+    eigen = {name: content for name, content in brought.items() if name.startswith("Eigen/")}
+    with zipfile.ZipFile(wheel) as archive:
+        names = [name for name in archive.namelist() if name.startswith("auvest/include/Eigen/")]
+        shipped = {name.removeprefix("auvest/include/"): archive.read(name) for name in names}
+    licences = {"Eigen/COPYING.MPL2", "Eigen/README.Eigen"}
+    assert len(eigen) > 150
+    assert eigen == {name: shipped[name] for name in shipped.keys() - licences}
+    assert "xsimd/xsimd.hpp" in brought
+    assert {name.partition("/")[0] for name in brought} == {"Eigen", "xsimd"}
+
+
+def test_sdist_is_compiled_with_its_own_headers(sdist, tmp_path, run):
+    """Eigen and xsimd of this computer are not looked at."""
+    with tarfile.open(sdist) as archive:
+        archive.extractall(tmp_path, filter="data")
+    (unpacked,) = tmp_path.glob("auvest-*")
+    build = tmp_path / "build"
+    run(
+        *("cmake", "-S", unpacked, "-B", build, "-G", "Ninja", "-DAUVEST_BUILD_BINDINGS=ON"),
+        *("-DCMAKE_EXPORT_COMPILE_COMMANDS=ON", "-DCMAKE_DISABLE_FIND_PACKAGE_Eigen3=ON"),
+        f"-DPython_EXECUTABLE={sys.executable}",
+        f"-Dpybind11_DIR={run(sys.executable, '-m', 'pybind11', '--cmakedir').strip()}",
+    )
+    commands = json.loads((build / "compile_commands.json").read_text())
+    (command,) = (
+        entry["command"] for entry in commands if entry["file"].endswith("/wide_avx2.cpp")
+    )
+    compile_only, _, source = command.partition(" -o ")
+    includes = run(*compile_only.split(), "-M", source.split()[-1], cwd=build)
+    named = re.findall(r"\S*/(?:Eigen|xsimd)/\S+", includes)
+    assert any("/Eigen/" in name for name in named)
+    assert any("/xsimd/" in name for name in named)
+    assert all(name.startswith(f"{unpacked}/cpp/vendored/") for name in named)
+
+
+def test_readme_of_the_package_leads_nowhere_that_is_not_there(sdist):
+    """Its links are into the repository: their texts remain. Blocks of code are as they were."""
+    readme = files_of(sdist)["README.md"].decode()
+    shown = HeaderParser().parsestr(files_of(sdist)["PKG-INFO"].decode()).get_payload()
+    link = re.compile(r"\[([^\]]+)\]\((?!https?:)[^)]+\)")
+    texts = link.findall(re.sub(r"!\[[^\]]*\]\([^)]*\)", "", readme))
+    assert len(texts) > 20
+    assert not link.search(shown)
+    assert all(text in shown for text in texts)
+    assert [*CODE.findall(shown)] == [*CODE.findall(readme)]
 
 
 def test_tests_run_with_the_packages_of_the_lock(root):
@@ -191,7 +239,7 @@ def test_tests_run_with_the_packages_of_the_lock(root):
         assert re.search(r"--hash=sha256:[0-9a-f]{64}", entry), name
         locked.setdefault(name, set()).add(found)
     text = (root / "pyproject.toml").read_text()
-    lists = re.findall(r"(?ms)^(?:requires|dependencies|test|dev) = \[(.*?)\]$", text)
+    lists = re.findall(r"(?ms)^(?:requires|dependencies|test|dev|release) = \[(.*?)\]$", text)
     wanted = [name for part in lists for name in re.findall(r'"([A-Za-z0-9-]+)[>=]', part)]
     assert {"pybind11", "numpy", "hypothesis", "mypy"} <= set(wanted)
     for name in wanted:
