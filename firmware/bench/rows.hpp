@@ -1,6 +1,7 @@
 // Rows in, answers out: what every bench has, whatever filter is in it. What includes this has
-// named kDigest, kStartWords and kRowWords, and defines below it
+// named kDigest and kMostWords, those of the longest row, and defines below it
 //
+//     uint8_t words(row)     how many the row should have that has come
 //     Status begin()         takes row 0, the start
 //     Status step()          takes another row
 //     void   show(FrameOut&) adds what the filter is now to an answer
@@ -32,7 +33,7 @@ using auvest::Status;
 
 constexpr uint32_t kAnew = 0xffffffff;
 
-FrameIn<(kRowWords > kStartWords ? kRowWords : kStartWords)> frame;
+FrameIn<kMostWords> frame;
 
 float number(uint8_t i) { return auvest::math::from_bits(frame.word(i)); }
 
@@ -41,6 +42,7 @@ uint32_t next = 0;  // row that has not come yet
 uint32_t took = 0;
 uint32_t said = 0;
 
+uint8_t words(uint32_t row);
 Status begin();
 Status step();
 void show(FrameOut& out);
@@ -56,15 +58,14 @@ void put(FrameOut& out, const State& x, const Covariance& P) {
   }
 }
 
-/// The same of a row, from word `from` on; gives the word behind them.
+/// The same of a row, from word `from` on.
 template <class State, class Covariance>
-uint8_t get(uint8_t from, State& x, Covariance& P) {
+void get(uint8_t from, State& x, Covariance& P) {
   auvest::math::set_zero(P);
   for (uint8_t i = 0; i < State::RowsAtCompileTime; ++i) x(i) = number(from++);
   for (uint8_t i = 0; i < State::RowsAtCompileTime; ++i) {
     for (uint8_t j = 0; j <= i; ++j) P(i, j) = number(from++);
   }
-  return from;
 }
 
 void say(char kind) {
@@ -106,7 +107,7 @@ void take(char character) {
     next = 0;
     return say('B');
   }
-  if (row == next && frame.count() == (row == 0 ? kStartWords : kRowWords)) {
+  if (row == next && frame.count() == words(row)) {
     take_row();
     return answer();
   }

@@ -28,7 +28,7 @@ from auvest import (
     Sonar,
     UnicycleMotion,
 )
-from auvest.firmware.hil_slat import SlatRecord
+from auvest.firmware.hil_slat import Newcomer, SlatRecord, steps_of_run
 from auvest.slat import SlatFilter
 from firmware.parity.targets import AVR_PARTICLES, HERE, INCLUDES, MASTERS, PARTICLES, Target
 
@@ -329,23 +329,25 @@ class Record:
     def for_bench(self) -> SlatRecord:
         """Give the record as hardware in the loop plays it."""
         steps = self.world.steps
-        slave, told = self.world.slave, self.world.masters[: self.told]
+        told = self.world.masters[: self.told]
         times = np.concatenate([[0.0], np.cumsum([float(step.dt) for step in steps])])
         echoes = [step.echoes for step in steps]
         heard = [time + part["after_s"] for time, part in zip(times[:-1], echoes, strict=True)]
-        return SlatRecord.of_run(
-            self.filter("scalar"),
-            slave["x"],
-            symmetric(slave["P"], self.motion.pose_states),
-            [(master["x"], symmetric(master["P"], 6)) for master in told],
+        played = steps_of_run(
             times,
             np.array([step.u for step in steps]),
             z=np.concatenate([part["z"] for part in echoes]),
             z_time_s=np.concatenate(heard),
             master=np.concatenate([part["master"] for part in echoes]),
             changes=np.array([step.changes for step in steps]) if self.planned else None,
-            seed=self.seed,
-            room=self.room,
+        )
+        return SlatRecord(
+            self.filter("scalar"),
+            self.world.slave["x"],
+            symmetric(self.world.slave["P"], self.motion.pose_states),
+            self.seed,
+            [*(Newcomer(one["x"], symmetric(one["P"], 6)) for one in told), *played],
+            self.room,
         )
 
     def to_bytes(self) -> bytes:

@@ -1,8 +1,7 @@
 """What `auvest hil` plays to a filter that localises and tracks: its start, and rows for it.
 
-A row is a prediction, if time has passed, and what the sonar heard at its end.
-:meth:`SlatRecord.of_run` makes the rows of the arrays that :meth:`auvest.slat.SlatFilter.run`
-takes.
+A row is a prediction, if time has passed, and what the sonar heard at its end; or a master comes
+in. :func:`steps_of_run` makes rows of the arrays that ``run`` of these filters takes.
 """
 
 from __future__ import annotations
@@ -18,10 +17,8 @@ from auvest._core import Status
 from auvest.errors import FilterError
 from auvest.firmware.cost import literal
 from auvest.firmware.hil_record import Words, bits
-from auvest.slat import UNKNOWN_MASTER, EkfSlat, ParticleSlatFilter, Slatf, SlatFilter, SlatfJoint
+from auvest.slat import EkfSlat, ParticleSlatFilter, Slatf, SlatFilter, SlatfJoint
 from auvest.slat.models import Imm, PiecewiseAcceleration
-
-_Numbers = npt.NDArray[np.float32]
 
 _BEARINGS = {
     "master_to_slave": "kMasterToSlave",
@@ -34,11 +31,83 @@ _IMM = (
     "auvest::CoordinatedTurn<float>>"
 )
 _MODES = 3
+#: Flags of a row.
+_MOVES, _PLANNED, _NEWCOMER = 1, 2, 4
+
+
+@dataclass(frozen=True, eq=False)
+class Newcomer:
+    """A row in which the filter is told of one master more: mean and covariance."""
+
+    x: npt.NDArray[np.float32]
+    P: npt.NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """A row of dead reckoning, and what the sonar heard at its end.
+
+    Attributes
+    ----------
+    dt : float or None
+        Time that the row predicts over, s; None: no time has passed since the row before.
+    u : ndarray, shape (2,)
+        The slave's reading.
+    changes : ndarray, shape (M, 2), or None
+        Velocity changes that the masters planned for that time, m/s; None: nobody knows.
+    z : ndarray, shape (K, 2)
+        Range and bearing of each echo.
+    master : ndarray of int, shape (K,)
+        Whose it is; ``UNKNOWN_MASTER``: nobody knows.
+    """
+
+    dt: float | None
+    u: npt.NDArray[np.float32]
+    changes: npt.NDArray[np.float32] | None
+    z: npt.NDArray[np.float32]
+    master: npt.NDArray[np.int_]
+
+
+def steps_of_run(
+    time_s: npt.ArrayLike,
+    u: npt.ArrayLike,
+    *,
+    z: npt.ArrayLike | None = None,
+    z_time_s: npt.ArrayLike | None = None,
+    master: npt.ArrayLike | None = None,
+    changes: npt.ArrayLike | None = None,
+) -> list[Step]:
+    """Make the rows of what ``run`` takes, from echo to echo; see :meth:`auvest.SlatFilter.run`."""
+    times, readings = np.asarray(time_s, float), np.asarray(u, np.float32)
+    echoes = np.empty((0, 2)) if z is None else np.asarray(z, float)
+    heard_at = np.empty(0) if z_time_s is None else np.asarray(z_time_s, float)
+    whose = np.broadcast_to(0 if master is None else np.asarray(master), len(echoes))
+    there = ~np.isnan(echoes[:, 0])
+    echoes, heard_at, whose = echoes[there].astype(np.float32), heard_at[there], whose[there]
+    plan = None if changes is None else np.asarray(changes, float)
+
+    def heard(moment: float) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+        now = heard_at == moment
+        return echoes[now], whose[now]
+
+    rows = []
+    now = times[0]
+    if (heard_at == now).any():
+        rows.append(Step(None, np.zeros(2, np.float32), None, *heard(now)))
+    for k, reading in enumerate(readings):
+        begin, end = times[k], times[k + 1]
+        for stop in np.unique([*heard_at[(heard_at > begin) & (heard_at <= end)], end]):
+            if stop > now:
+                share = (stop - now) / (end - begin)
+                planned = None if plan is None else (share * plan[k]).astype(np.float32)
+                rows.append(Step(float(np.float32(stop - now)), reading, planned, *heard(stop)))
+                now = stop
+    return rows
 
 
 @dataclass(frozen=True, eq=False)
 class SlatRecord:
-    """A filter at its start, and T rows for it, with at most E echoes at one time.
+    """A filter at its start, and T rows for it.
 
     Attributes
     ----------
@@ -48,132 +117,43 @@ class SlatRecord:
         Of the slave, as the filter took them.
     seed : int
         Of its random numbers.
-    masters : sequence of (ndarray, ndarray)
-        Mean and covariance of each master that it is told at the start.
+    rows : sequence of Step or Newcomer
     room : int
         Masters that the chip has room for.
-    dt : ndarray, shape (T,)
-        Time that the row predicts over, s.
-    moves : ndarray of bool, shape (T,)
-        Whether it predicts; echoes at the very start come without.
-    u : ndarray, shape (T, 2)
-        The slave's readings.
-    changes : ndarray, shape (T, room, 2), or None
-        Velocity changes that the masters planned for that time, m/s; None: nobody knows.
-    z : ndarray, shape (T, E, 2)
-        Range and bearing of each echo; NaN: there is none.
-    master : ndarray of int, shape (T, E)
-        Whose it is; ``UNKNOWN_MASTER``: nobody knows.
     """
 
     filter: SlatFilter
     x0: npt.NDArray[Any]
     P0: npt.NDArray[Any]
     seed: int
-    masters: Sequence[tuple[npt.NDArray[Any], npt.NDArray[Any]]]
+    rows: Sequence[Step | Newcomer]
     room: int
-    dt: _Numbers
-    moves: npt.NDArray[np.bool_]
-    u: _Numbers
-    changes: _Numbers | None
-    z: _Numbers
-    master: npt.NDArray[np.int_]
 
     def __post_init__(self) -> None:
         if not isinstance(self.filter, (Slatf, SlatfJoint, EkfSlat)):
             raise ValueError(f"{type(self.filter).__name__} is for the desk only")
         if self.filter.dtype != np.float32:
             raise ValueError(f"the filter must be in float32, not in {self.filter.dtype}")
-        if not 1 <= len(self.masters) <= self.room <= self.filter._max_masters:
+        told = sum(isinstance(row, Newcomer) for row in self.rows)
+        if not max(1, told) <= self.room <= self.filter._max_masters:
             raise ValueError(
-                f"room is {self.room}: it must be from the {len(self.masters)} masters told to the "
+                f"room is {self.room}: it must be from the {told} masters told to the "
                 f"{self.filter._max_masters} that the filter takes"
             )
-        columns = [self.dt, self.moves, self.u, self.z, self.master]
-        if self.changes is not None:
-            columns.append(self.changes)
-        if len({len(column) for column in columns}) != 1:
-            raise ValueError(
-                "dt, moves, u, changes, z and master must have the same number of rows"
-            )
-
-    @classmethod
-    def of_run(
-        cls,
-        filter_: SlatFilter,
-        x0: npt.ArrayLike,
-        P0: npt.ArrayLike,
-        masters: Sequence[tuple[npt.ArrayLike, npt.ArrayLike]],
-        time_s: npt.ArrayLike,
-        u: npt.ArrayLike,
-        *,
-        z: npt.ArrayLike,
-        z_time_s: npt.ArrayLike,
-        master: npt.ArrayLike = 0,
-        changes: npt.ArrayLike | None = None,
-        seed: int = 1,
-        room: int | None = None,
-    ) -> SlatRecord:
-        """Make the rows of what ``filter_.run`` takes: a prediction from echo to echo.
-
-        Parameters
-        ----------
-        filter_, x0, P0, masters, seed
-            See the class; ``masters`` as :meth:`auvest.slat.SlatFilter.add_master` takes them.
-        time_s, u, z, z_time_s, master, changes
-            See :meth:`auvest.slat.SlatFilter.run`.
-        room : int, optional
-            See the class; default: the masters told.
-        """
-        times, heard_at = (np.asarray(column, float) for column in (time_s, z_time_s))
-        readings, echoes = np.asarray(u, float), np.asarray(z, float)
-        whose = np.broadcast_to(np.asarray(master), len(echoes))
-        there = ~np.isnan(echoes[:, 0])
-        echoes, heard_at, whose = echoes[there], heard_at[there], whose[there]
-        most = len(masters) if room is None else room
-        plan = np.zeros((len(readings), most, 2))
-        if changes is not None:
-            given = np.asarray(changes, float)
-            plan[:, : given.shape[1]] = given[:, :most]
-        moments, first, counts = np.unique(heard_at, return_index=True, return_counts=True)
-        rows: list[tuple[float, bool, int, float, slice]] = []
-        now = times[0]
-        if len(moments) and moments[0] == now:
-            rows.append((0.0, False, 0, 0.0, slice(0, int(counts[0]))))
-        for k in range(len(readings)):
-            begin, end = times[k], times[k + 1]
-            inside = np.flatnonzero((moments > begin) & (moments <= end))
-            stops = [(moments[i], slice(int(first[i]), int(first[i] + counts[i]))) for i in inside]
-            if (not stops or stops[-1][0] < end) and end > begin:
-                stops.append((end, slice(0, 0)))
-            for stop, group in stops:
-                rows.append((stop - now, True, k, (stop - now) / (end - begin), group))
-                now = stop
-        dt, moves, of, share, groups = zip(*rows, strict=True)
-        width = max(1, *(group.stop - group.start for group in groups))
-        heard = np.full((len(rows), width, 2), np.nan, np.float32)
-        numbers = np.full((len(rows), width), UNKNOWN_MASTER)
-        for k, group in enumerate(groups):
-            size = group.stop - group.start
-            heard[k, :size], numbers[k, :size] = echoes[group], whose[group]
-        planned = (np.array(share)[:, None, None] * plan[list(of)]).astype(np.float32)
-        return cls(
-            filter=filter_,
-            x0=np.asarray(x0, np.float32),
-            P0=np.asarray(P0, np.float32),
-            seed=seed,
-            masters=[(np.asarray(x, np.float32), np.asarray(P, np.float32)) for x, P in masters],
-            room=most,
-            dt=np.array(dt, np.float32),
-            moves=np.array(moves),
-            u=readings[list(of)].astype(np.float32),
-            changes=None if changes is None else planned,
-            z=heard,
-            master=numbers,
-        )
 
     def __len__(self) -> int:
-        return len(self.dt)
+        return len(self.rows)
+
+    @property
+    def dt(self) -> npt.NDArray[np.float32]:
+        """Time that each row predicts over, s."""
+        steps = [row.dt or 0.0 if isinstance(row, Step) else 0.0 for row in self.rows]
+        return np.array(steps, np.float32)
+
+    @property
+    def echoes(self) -> int:
+        """Most echoes at one time, at least 1."""
+        return max(1, *(len(row.z) for row in self.rows if isinstance(row, Step)))
 
     @property
     def particles(self) -> int:
@@ -205,13 +185,10 @@ class SlatRecord:
         """Make the filter, at its start."""
         models = {"motion": self.filter.motion, "sonar": self.filter.sonar, "dtype": "float32"}
         settings = {**models, **self.filter._settings, "seed": self.seed}
-        filter_ = type(self.filter)(self.x0, self.P0, **settings)
-        for x, P in self.masters:
-            filter_.add_master(x, P)
-        return filter_
+        return type(self.filter)(self.x0, self.P0, **settings)
 
     def on_desk(self) -> Words:
-        """Give the bits after the start and after each row, shape (T + 1, fields): the right ones.
+        """Give the bits after the start and after each row, shape (T + 1, fields).
 
         Raises
         ------
@@ -220,15 +197,16 @@ class SlatRecord:
         """
         filter_ = self.start()
         lines = [self._line(filter_, Status.ok)]
-        for k in range(len(self)):
+        for k, row in enumerate(self.rows):
             status = Status.ok
-            there = ~np.isnan(self.z[k, :, 0])
             try:
-                if self.moves[k]:
-                    changes = None if self.changes is None else self.changes[k, : filter_.masters]
-                    filter_.predict(float(self.dt[k]), self.u[k], changes=changes)
-                if there.any():
-                    filter_.update(self.z[k, there], self.master[k, there])
+                if isinstance(row, Newcomer):
+                    filter_.add_master(row.x, row.P)
+                else:
+                    if row.dt is not None:
+                        filter_.predict(row.dt, row.u, changes=_known(row, filter_.masters))
+                    if len(row.z):
+                        filter_.update(row.z, row.master)
             except FilterError as error:
                 status = error.status
             if filter_.masters > self.room:
@@ -256,6 +234,16 @@ class SlatRecord:
         return np.concatenate([np.array([int(status)], np.uint32), floats])
 
 
+def _known(row: Step, masters: int) -> npt.NDArray[np.float32] | None:
+    """Give the changes for as many masters as there are."""
+    if row.changes is None:
+        return None
+    known = np.zeros((max(1, masters), 2), np.float32)
+    size = min(len(known), len(row.changes))
+    known[:size] = row.changes[:size]
+    return known
+
+
 def _belief(whose: str, state: Sequence[str]) -> list[str]:
     names = [f"{whose} x[{name}]" for name in state]
     return names + [f"{whose} P[{a}, {b}]" for i, a in enumerate(state) for b in state[: i + 1]]
@@ -266,19 +254,26 @@ def _belief(whose: str, state: Sequence[str]) -> list[str]:
 
 def rows(record: SlatRecord) -> list[list[int]]:
     """Give the words of the start and of all rows, without their numbers."""
-    beliefs = [(record.x0, record.P0), *record.masters]
-    start = [np.concatenate([x, P[np.tril_indices(len(x))]]) for x, P in beliefs]
-    words: list[list[int]] = [bits(np.concatenate(start)).tolist()]
-    planned = record.changes is not None
-    for k in range(len(record)):
-        count = int((~np.isnan(record.z[k, :, 0])).sum())
-        flags = int(record.moves[k]) | planned << 1 | count << 8
-        changes = np.zeros((record.room, 2)) if record.changes is None else record.changes[k]
-        moved = np.concatenate([[record.dt[k]], record.u[k], changes.ravel()])
-        heard = bits(np.nan_to_num(record.z[k]))
-        whose = record.master[k].astype(np.int32).view(np.uint32)
-        echoes = np.column_stack([heard, whose]).ravel()
-        words.append([flags, *bits(moved).tolist(), *echoes.tolist()])
+    words = [_words_of(record.x0, record.P0)]
+    for row in record.rows:
+        if isinstance(row, Newcomer):
+            words.append([_NEWCOMER, *_words_of(row.x, row.P)])
+            continue
+        planned, count = row.changes is not None, len(row.z)
+        flags = (row.dt is not None) * _MOVES | planned * _PLANNED | count << 8
+        changes = _known(row, record.room)
+        if changes is None:
+            changes = np.zeros((record.room, 2), np.float32)
+        moved = np.concatenate([[row.dt or 0.0], row.u, changes.ravel()])
+        echoes = np.zeros((record.echoes, 3), np.uint32)
+        echoes[:count, :2] = bits(row.z)
+        echoes[:count, 2] = row.master.astype(np.int32).view(np.uint32)
+        words.append([flags, *bits(moved).tolist(), *echoes.ravel().tolist()])
+    return words
+
+
+def _words_of(x: npt.NDArray[Any], P: npt.NDArray[Any]) -> list[int]:
+    words: list[int] = bits(np.concatenate([x, P[np.tril_indices(len(x))]])).tolist()
     return words
 
 
@@ -320,8 +315,7 @@ def places(record: SlatRecord) -> dict[str, str]:
         "MASTER": _IMM if record._modes else _ONE_MODEL,
         "ROOM": str(record.room),
         "FILTER": _type(filter_, settings),
-        "TOLD": str(len(record.masters)),
-        "ECHOES": str(record.z.shape[1]),
+        "ECHOES": str(record.echoes),
         "MAKE": _lines(make),
         "MODES": _lines(modes),
         "SHOW": _lines(show),
