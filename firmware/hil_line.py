@@ -1,9 +1,10 @@
 """Put a bench behind a pseudo-terminal, damage what passes, and play a log over it.
 
     python -m firmware.hil_line LOG [--config FILE] [--filter NAME] [--rows N]
-        [--bench host|atmega2560] [--damage 0.01] [--seed 1]
+        [--bench host|atmega2560|atmega2560-uart] [--damage 0.01] [--seed 1]
 
-The port is one as a board's, and ``auvest hil --target serial:PORT`` plays to it. In both
+The port is one as a board's, and ``auvest hil --target serial:PORT`` plays to it. On the simulated
+MEGA2560 bytes are there at once; ``atmega2560-uart`` has its serial port, at 115,200 baud. In both
 directions a frame in a hundred loses or changes bits, bytes or parts, comes twice, loses its end or
 is lost. The bits must be those of the desk; exit code 1 if they are not.
 """
@@ -23,7 +24,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from auvest.board import Board, SerialLine
+from auvest.board import Board, SerialLine, WaitsForInput
 from auvest.firmware import hil, simulator
 from auvest.firmware.hil_bench import Bench, bench
 from auvest.firmware.hil_record import record_of
@@ -132,6 +133,24 @@ def _on_host(program: Bench, folder: Path) -> Iterator[tuple[str, Answer]]:
 
 @contextmanager
 def _on_board(program: Bench, folder: Path) -> Iterator[tuple[str, Answer]]:
+    """Not held to a baud rate."""
+    compiled = hil.build_sketch(program, folder)
+    runner = simulator.find_or_build()
+    with Board(compiled.elf, runner=runner, limit_s=10.0 * len(program.rows), raw=True) as board:
+        waits = (event for event in board if isinstance(event, WaitsForInput))
+
+        def said() -> str:
+            return next(waits).output.decode("ascii").rstrip("\n")
+
+        def answer(line: str) -> str:
+            board.feed(f"{line}\n".encode("latin-1"))
+            return said()
+
+        yield said(), answer
+
+
+@contextmanager
+def _on_serial_port(program: Bench, folder: Path) -> Iterator[tuple[str, Answer]]:
     compiled = hil.build_sketch(program, folder, serial=True)
     runner = simulator.find_or_build()
     with Board(compiled.elf, runner=runner, limit_s=10.0 * len(program.rows)) as board:
@@ -147,7 +166,7 @@ def _on_board(program: Bench, folder: Path) -> Iterator[tuple[str, Answer]]:
         yield said(), answer
 
 
-BENCHES = {"host": _on_host, "atmega2560": _on_board}
+BENCHES = {"host": _on_host, "atmega2560": _on_board, "atmega2560-uart": _on_serial_port}
 
 
 @contextmanager
@@ -165,7 +184,7 @@ def served(first: str, answer: Answer, noise: Noise) -> Iterator[Line]:
 
 @contextmanager
 def behind_a_port(where: str, program: Bench, folder: Path, noise: Noise) -> Iterator[Line]:
-    """Build a bench for this computer or the simulated MEGA2560, and give it a serial port."""
+    """Build one of `BENCHES`, and give it a serial port."""
     with (
         BENCHES[where](program, folder) as (first, answer),
         served(first, answer, noise) as line,

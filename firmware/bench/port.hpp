@@ -35,11 +35,7 @@ inline uint32_t microseconds() { return micros(); }
 
 namespace port {
 
-inline char get() {
-  const uint8_t byte = board::read();
-  if (byte == 4) board::finish();  // end of transmission
-  return static_cast<char>(byte);
-}
+inline char get() { return static_cast<char>(board::read()); }
 inline void put(char character) { board::write(static_cast<uint8_t>(character)); }
 inline void begin() { board::begin(1); }
 inline void end() { board::end(1); }

@@ -18,7 +18,18 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from auvest import CompassMotion, Imm, PiecewiseAcceleration, Sonar, UnicycleMotion
+from auvest import (
+    CompassMotion,
+    EkfSlat,
+    Imm,
+    PiecewiseAcceleration,
+    Slatf,
+    SlatfJoint,
+    Sonar,
+    UnicycleMotion,
+)
+from auvest.firmware.hil_slat import Newcomer, SlatRecord, steps_of_run
+from auvest.slat import SlatFilter
 from firmware.parity.targets import AVR_PARTICLES, HERE, INCLUDES, MASTERS, PARTICLES, Target
 
 Kind = Literal[
@@ -287,6 +298,58 @@ class Record:
     birth_acceleration_m_s2: float = 0.01
     kept: float = 0.5
 
+    def filter(self, lanes: str) -> SlatFilter:
+        """Make it in Python, without the masters; a `Slatf` runs in the lanes of this set."""
+        motion = self.motion.pose_states
+        start = self.world.slave["x"], symmetric(self.world.slave["P"], motion)
+        models: dict[str, Any] = {"motion": self.motion, "sonar": self.sonar, "gate": self.gate}
+        models |= {"master": self.master, "dtype": "float32", "recover_after": 0}
+        if self.kind.startswith("ekf"):
+            return EkfSlat(*start, **models)
+        particles = {"particles": self.particles, "seed": self.seed}
+        particles |= {"resample_below": self.resample_below}
+        joint = {"kept": self.kept, "max_masters": self.room}
+        if self.kind == "slatf-shared":
+            del models["recover_after"]
+            return SlatfJoint(*start, **models, **particles, **joint, covariance="shared")
+        if self.kind.startswith("slatf-joint"):
+            return SlatfJoint(*start, **models, **particles, **joint)
+        return Slatf(
+            *start,
+            **models,
+            **particles,
+            version=1 if self.kind.startswith("slatf1") else 2,
+            carry_covariance=self.carry_covariance,
+            birth_velocity_m_s=self.birth_velocity_m_s,
+            birth_acceleration_m_s2=self.birth_acceleration_m_s2,
+            monte_carlo=False,
+            lanes=lanes,
+        )
+
+    def for_bench(self) -> SlatRecord:
+        """Give the record as hardware in the loop plays it."""
+        steps = self.world.steps
+        told = self.world.masters[: self.told]
+        times = np.concatenate([[0.0], np.cumsum([float(step.dt) for step in steps])])
+        echoes = [step.echoes for step in steps]
+        heard = [time + part["after_s"] for time, part in zip(times[:-1], echoes, strict=True)]
+        played = steps_of_run(
+            times,
+            np.array([step.u for step in steps]),
+            z=np.concatenate([part["z"] for part in echoes]),
+            z_time_s=np.concatenate(heard),
+            master=np.concatenate([part["master"] for part in echoes]),
+            changes=np.array([step.changes for step in steps]) if self.planned else None,
+        )
+        return SlatRecord(
+            self.filter("scalar"),
+            self.world.slave["x"],
+            symmetric(self.world.slave["P"], self.motion.pose_states),
+            self.seed,
+            [*(Newcomer(one["x"], symmetric(one["P"], 6)) for one in told), *played],
+            self.room,
+        )
+
     def to_bytes(self) -> bytes:
         """Return the record as the replay programs read it."""
         steps = self.world.steps
@@ -378,6 +441,13 @@ class Record:
         if len(data) != prefix + rows * self.trace.itemsize:
             raise ValueError(f"{self.kind}: a trace of {len(data)} bytes is not of {rows} rows")
         return np.frombuffer(data, self.trace, offset=prefix)
+
+
+def symmetric(lower: npt.NDArray[Any], n: int) -> npt.NDArray[np.float32]:
+    """Make a covariance of its lower triangle."""
+    matrix = np.zeros((n, n), np.float32)
+    matrix[np.tril_indices(n)] = lower
+    return matrix + np.tril(matrix, -1).T
 
 
 def fields_of(kind: Kind, masters: int = 1) -> int:

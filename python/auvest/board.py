@@ -80,6 +80,25 @@ class PinChange:
 
 
 @dataclass(frozen=True)
+class WaitsForInput:
+    """The program waits in ``board::read`` for bytes; see `Board.feed`.
+
+    Attributes
+    ----------
+    time_s : float
+        Simulated time.
+    output : bytes
+        What ``board::write`` has written since the last of these events.
+    cycle : int
+        The time as a number of clock cycles.
+    """
+
+    time_s: float
+    output: bytes
+    cycle: int
+
+
+@dataclass(frozen=True)
 class Section:
     """Passes through a section of the program, between ``board::begin`` and ``board::end``.
 
@@ -201,7 +220,7 @@ class Finished:
     report: Report
 
 
-Event = SerialLine | PinChange | Finished
+Event = SerialLine | PinChange | WaitsForInput | Finished
 
 
 class BoardError(RuntimeError):
@@ -272,6 +291,9 @@ class Board:
         File of the bytes for ``board::read``.
     output : path, optional
         File for the bytes from ``board::write``, written at the end.
+    raw : bool
+        Where ``input`` ends, the program's ``board::read`` waits, which is an event, for what
+        `feed` gives it: bytes in both directions that no baud rate holds up.
     eeprom : path, optional
         File of what the EEPROM holds, read at the start and written at the end. One that is not
         there is erased memory.
@@ -302,6 +324,7 @@ class Board:
         frequency_hz: int = 16_000_000,
         input: str | os.PathLike[str] | None = None,
         output: str | os.PathLike[str] | None = None,
+        raw: bool = False,
         eeprom: str | os.PathLike[str] | None = None,
         reset_cause: str = "power-on",
         cut_cycle: int | None = None,
@@ -324,6 +347,8 @@ class Board:
             self._command += ["--input", os.fspath(input)]
         if output is not None:
             self._command += ["--output", os.fspath(output)]
+        if raw:
+            self._command.append("--raw")
         if eeprom is not None:
             self._command += ["--eeprom", os.fspath(eeprom)]
         self._command += ["--reset-cause", reset_cause, "--seed", str(seed)]
@@ -394,6 +419,18 @@ class Board:
         delay = as_number("delay_s", delay_s, "not negative")
         self._write(f"send {round(delay * self.frequency_hz)} {text}", keep_waiting=True)
 
+    def feed(self, data: bytes) -> None:
+        """Give the program bytes for ``board::read``, which are there at once.
+
+        A program that waits for some, and gets none before the next event is asked for, has failed.
+
+        Raises
+        ------
+        RuntimeError
+            If the run is over.
+        """
+        self._write(f"feed {data.hex()}", keep_waiting=True)
+
     def cut(self, delay_s: float = 0.0) -> None:
         """Cut the power: the run ends, as ``cut``, and what the EEPROM holds is kept.
 
@@ -462,6 +499,8 @@ class Board:
         if kind == "pin":
             pin, level = text.split()
             return PinChange(time_s=time_s, pin=pin, level=level == "1", cycle=int(cycle))
+        if kind == "input":
+            return WaitsForInput(time_s=time_s, output=bytes.fromhex(text), cycle=int(cycle))
         return SerialLine(time_s=time_s, text=text, cycle=int(cycle))
 
     def _end(self, report: Report) -> Finished:

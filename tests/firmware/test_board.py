@@ -9,7 +9,15 @@ import subprocess
 
 import pytest
 
-from auvest.board import Board, BoardError, Finished, PinChange, SerialLine, find_runner
+from auvest.board import (
+    Board,
+    BoardError,
+    Finished,
+    PinChange,
+    SerialLine,
+    WaitsForInput,
+    find_runner,
+)
 
 pytest_plugins = ["board_support"]
 
@@ -738,6 +746,31 @@ def test_a_failure_is_an_exception(compile_avr, board):
         desk.run()
     assert error.value.report is desk.report
     assert pickle.loads(pickle.dumps(error.value)).report == desk.report
+
+
+def test_raw_bytes_pass_at_once_and_the_chip_waits_for_them(compile_avr, board):
+    echo = "for (uint8_t i = 0; i < 6; ++i) board::write(board::read() ^ 0x5a);"
+    elf = compile_avr(program(echo))
+    given = bytes([0, 10, 13, 255, 65, 90])
+    wanted = bytes(byte ^ 0x5A for byte in given)
+    with board(elf, raw=True) as desk:
+        events = iter(desk)
+        first = next(events)
+        assert isinstance(first, WaitsForInput)
+        assert first.output == b""
+        desk.feed(given[:2])
+        desk.feed(given[2:5])  # before the next event is asked for: behind the first
+        second = next(events)
+        assert second.output == wanted[:5]
+        assert first.cycle < second.cycle < first.cycle + 200  # of a UART: 7,000
+        assert second.time_s == second.cycle / 16e6
+        desk.feed(given[5:])
+        assert isinstance(next(events), Finished)
+    with board(elf, raw=True) as desk:
+        events = iter(desk)
+        next(events)
+        with pytest.raises(BoardError, match="read past the end of the input stream"):
+            next(events)
 
 
 def test_options_of_board(compile_avr, board, tmp_path):

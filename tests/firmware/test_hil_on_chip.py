@@ -6,7 +6,7 @@ import pytest
 import auvest
 from auvest.firmware import hil, hil_serial
 from auvest.firmware.hil_bench import bench
-from auvest.firmware.hil_record import Record, on_desk
+from auvest.firmware.hil_record import Record
 from firmware import hil_line
 
 pytest_plugins = ["board_support"]
@@ -58,7 +58,7 @@ def record():
 
 
 def test_the_record_asks_for_all_that_is_compared(record):
-    desk = on_desk(record)
+    desk = record.on_desk()
     decisions = {int(word) >> 8 & 0xFF for word in desk[:, 0]}
     assert {int(auvest.Decision.accepted), int(auvest.Decision.rejected)} <= decisions
     assert (desk[:, 0] & 0xFF == 0).all()
@@ -90,7 +90,7 @@ def test_cortex_m_keeps_every_bit(record, folder):
 def test_the_board_keeps_every_bit_over_a_line_that_damages_frames(record, folder, monkeypatch):
     monkeypatch.setattr(hil_serial, "PATIENCE_S", 0.5)
     noise = hil_line.Noise(0.1, seed=2)
-    with hil_line.behind_a_port("atmega2560", bench(record), folder, noise) as line:
+    with hil_line.behind_a_port("atmega2560-uart", bench(record), folder, noise) as line:
         leg = hil.run(record, f"serial:{line.port}", folder)
     assert leg.difference is None
     assert noise.damaged >= 5

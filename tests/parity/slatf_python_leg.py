@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from auvest import EkfSlat, Slatf, SlatfJoint
 from auvest.slat import SlatFilter
-from firmware.parity.slatf import Record
+from firmware.parity.slatf import Record, symmetric
 from tests.parity.python_leg import bits
 
 
@@ -28,9 +27,9 @@ def replay_in_python(record: Record, lanes: str) -> tuple[np.ndarray, np.ndarray
     poses : ndarray of uint32, shape (rows, particles, pose)
         Bits of the particles' poses.
     """
-    slat = _filter(record, lanes)
+    slat = record.filter(lanes)
     for master in record.world.masters[: record.told]:
-        slat.add_master(master["x"], _symmetric(master["P"], 6))
+        slat.add_master(master["x"], symmetric(master["P"], 6))
     rows, poses = [], []
     for step in record.world.steps:
         changes = step.changes[None] if record.planned else None
@@ -43,34 +42,6 @@ def replay_in_python(record: Record, lanes: str) -> tuple[np.ndarray, np.ndarray
             rows.append(_row(slat, record))
             poses.append(bits(slat.poses) if record.particles else ())
     return np.array(rows), np.array(poses)
-
-
-def _filter(record: Record, lanes: str) -> SlatFilter:
-    slave = record.world.slave
-    start = slave["x"], _symmetric(slave["P"], record.motion.pose_states)
-    models: dict[str, Any] = {"motion": record.motion, "sonar": record.sonar, "gate": record.gate}
-    models |= {"master": record.master, "dtype": "float32", "recover_after": 0}
-    if record.kind.startswith("ekf"):
-        return EkfSlat(*start, **models)
-    particles = {"particles": record.particles, "seed": record.seed}
-    particles |= {"resample_below": record.resample_below}
-    if record.kind == "slatf-shared":
-        del models["recover_after"]
-        shared = {"covariance": "shared", "kept": record.kept, "max_masters": record.room}
-        return SlatfJoint(*start, **models, **particles, **shared)
-    if record.kind.startswith("slatf-joint"):
-        return SlatfJoint(*start, **models, **particles, kept=record.kept, max_masters=record.room)
-    return Slatf(
-        *start,
-        **models,
-        **particles,
-        version=1 if record.kind.startswith("slatf1") else 2,
-        carry_covariance=record.carry_covariance,
-        birth_velocity_m_s=record.birth_velocity_m_s,
-        birth_acceleration_m_s2=record.birth_acceleration_m_s2,
-        monte_carlo=False,
-        lanes=lanes,
-    )
 
 
 def _row(slat: SlatFilter, record: Record) -> np.ndarray:
@@ -89,9 +60,3 @@ def _row(slat: SlatFilter, record: Record) -> np.ndarray:
     if record.particles:
         row["resamplings"] = slat.resamplings
     return row
-
-
-def _symmetric(lower: np.ndarray, n: int) -> np.ndarray:
-    matrix = np.zeros((n, n), np.float32)
-    matrix[np.tril_indices(n)] = lower
-    return matrix + np.tril(matrix, -1).T

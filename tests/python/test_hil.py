@@ -25,7 +25,7 @@ from auvest.cli import app
 from auvest.firmware import hil, hil_serial
 from auvest.firmware.cost import registered
 from auvest.firmware.hil_bench import ANEW, Bench, answer_of, bench, row_frame
-from auvest.firmware.hil_record import Record, on_desk, place_names, record_of
+from auvest.firmware.hil_record import Record, place_names, record_of
 from auvest.logs import LogFolder
 from firmware.hil_line import BENCHES, Noise, served
 
@@ -87,7 +87,7 @@ def test_rows_are_those_that_a_replay_gives_to_its_filter(log: Path, record: Rec
     assert len(record) == 40 + 20  # a row per step, and one per range at its end
     assert record.measured.sum() == 20
     assert record.dt.sum() == 20
-    desk = on_desk(record)
+    desk = record.on_desk()
     x = desk[1:, 1].view(np.float32)
     ends = np.append(np.flatnonzero(record.dt[1:] > 0), len(record) - 1)  # last rows of their times
     np.testing.assert_allclose(x[ends], estimates, atol=1e-3)
@@ -103,7 +103,7 @@ def test_the_desk_is_the_filter_in_float32(record: Record) -> None:
         record.z, dt=record.dt, input=record.input, place=record.place,
         sensor=record.sensors[0],
     )  # fmt: skip
-    desk = dict(zip(record.fields, on_desk(record).T, strict=True))
+    desk = dict(zip(record.fields, record.on_desk().T, strict=True))
     nan = np.full(1, np.nan, np.float32)
     assert np.array_equal(desk["x[y_m]"][1:], result.x[:, 1].copy().view(np.uint32))
     assert np.array_equal(desk["nis"], np.concatenate([nan, result.nis]).view(np.uint32))
@@ -139,17 +139,27 @@ def test_another_parameter_is_another_program(record: Record) -> None:
     assert bench(replace(record, sensors=sensors)).digest != bench(record).digest
 
 
-def test_what_a_bench_cannot_do_is_refused() -> None:
+def test_a_record_that_cannot_be_is_refused() -> None:
     options: dict[str, Any] = {"process": auvest.Odometry(), "sensors": auvest.LeaderRange()}
     rows = (np.zeros(1, int), *(np.zeros((1, n), np.float32) for n in (1, 1, 3, 2)))
-    for more, message in (
-        ({}, "float32"),
-        ({"dtype": "float32", "components": 16, "kernel": "igg"}, "components must be 1"),
-        ({"dtype": "float32", "late_s": 1.0}, "late_s must be 0"),
+    age = np.zeros(1, np.float32)
+    for more, ages, message in (
+        ({}, None, "must be in float32"),
+        ({"dtype": "float32"}, age, "age is for a filter with late_s"),
+        ({"dtype": "float32", "late_s": 1.0}, np.zeros(2, np.float32), "number of rows"),
     ):
         filter_ = auvest.Ekf([0, 0, 0], np.eye(3), **options, **more)
         with pytest.raises(ValueError, match=message):
-            Record(filter_, (auvest.LeaderRange(),), *rows)
+            Record(filter_, (auvest.LeaderRange(),), *rows, ages)
+
+
+def test_late_measurements_of_a_log_are_played_with_their_age(log: Path) -> None:
+    settings = replace(SETTINGS, ranges=replace(SETTINGS.ranges, latency_s=0.7))
+    record = record_of(LogFolder(log), settings)
+    assert record.filter.late_s > 0
+    assert record.age is not None
+    assert 0 < record.age[record.measured].max() <= record.filter.late_s
+    assert "LateMemory" in bench(record).header
 
 
 # ---- The comparison ------------------------------------------------------------------------------
@@ -202,28 +212,51 @@ def test_a_log_on_this_computer(log: Path, record: Record, tmp_path: Path) -> No
     table = pa_parquet.read_table(output / "host.parquet")
     assert (output / "host.parquet").read_bytes() == (output / "desk.parquet").read_bytes()
     bits = np.ascontiguousarray(table["P[y_m, x_m]"].to_numpy()).view(np.uint32)
-    assert np.array_equal(bits, on_desk(record)[:, record.fields.index("P[y_m, x_m]")])
+    assert np.array_equal(bits, record.on_desk()[:, record.fields.index("P[y_m, x_m]")])
     assert table["time_s"][-1].as_py() == 20
     assert json.loads((output / "results.json").read_text())["legs"] == [leg]
     assert (output / "bench" / "bench.ino").is_file()
     assert "| host | 732 | 0 |" in (output / "README.md").read_text()
 
 
+def late(record: Record) -> Record:
+    """The same with ages from 0 s to some that are too late."""
+    age = 0.6 * (np.arange(len(record)) % 7)
+    return replace(record, age=age.astype(np.float32))
+
+
 def test_all_sensors_of_a_process_on_this_computer(tmp_path: Path) -> None:
-    """Six sensors in turn, where the station moves, a policy, parameters that are not the defaults;
-    a row that must be refused is refused there too, and the rows go on."""
-    record = family_record(
+    """Six sensors in turn, where the station moves, some late, a policy, parameters that are not
+    the defaults; a row that must be refused is refused there too, and the rows go on."""
+    record = late(family_record(
         auvest.Aukf, "WhiteAcceleration3", policy=auvest.CovarianceBudget(position_sigma_m=3.0),
         kernel=auvest.Igg(k0=1.2, k1=4.0), recovery=auvest.RejectionStreak(rejections=3),
-        alpha=0.5, longest_step_s=0.9,
-    )  # fmt: skip
-    desk = on_desk(record)
-    said = {auvest.Status(int(word) & 0xFF) for word in desk[:, 0]}
-    assert said == {auvest.Status.ok, auvest.Status.step_too_long}  # dt is 0.5, 0.75 or 1 s
+        alpha=0.5, longest_step_s=0.9, late_s=3.0,
+    ))  # fmt: skip
+    desk = record.on_desk()
+    status = auvest.Status
+    said = {status(int(word) & 0xFF) for word in desk[:, 0]}
+    assert said == {status.ok, status.step_too_long, status.time_backwards}  # dt: 0.5, 0.75, 1 s
     assert len({int(word) >> 8 & 0xFF for word in desk[:, 0]}) == 3  # every decision
     leg = hil.run(record, "host", tmp_path, desk=desk, flags=("-O0",))
     assert leg.difference is None
     assert leg.words.size == 61 * (1 + 6 + 21 + 1 + 3 + 1)
+
+
+def test_a_start_that_is_not_known_on_this_computer(tmp_path: Path) -> None:
+    """From a ring for each of two headings to one place; late measurements all the same."""
+    lost = family_support.make_lost(
+        auvest.RobustEkf, "Odometry", "float32", headings=2, components=16, late_s=3.0
+    )
+    record = late(replace(family_record(auvest.RobustEkf, "Odometry", late_s=3.0), filter=lost))
+    desk = record.on_desk()
+    components = desk[:, record.fields.index("components")].view(np.float32)
+    assert components[0] == 2
+    assert components.max() > 8
+    assert components.min() == 1
+    assert len(set(desk[:, record.fields.index("convergence")].tolist())) > 2
+    leg = hil.run(record, "host", tmp_path, desk=desk, flags=("-O0",))
+    assert leg.difference is None
 
 
 @pytest.mark.skipif(

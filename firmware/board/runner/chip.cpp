@@ -99,7 +99,8 @@ Chip::Chip(Program& program, World& world, const ChipOptions& options)
       world_(world),
       seed_(options.seed),
       at_limit_(options.at_limit),
-      input_(options.input) {
+      input_(options.input),
+      raw_(options.raw) {
   logging_chip = this;
   avr_global_logger_set(on_log);
   avr_ = make_avr(options);
@@ -149,15 +150,21 @@ void Chip::connect_registers() {
       this);
   avr_register_io_read(
       avr_, kGpior2,
-      [](avr_t*, avr_io_addr_t, void* self) -> uint8_t {
-        auto* chip = static_cast<Chip*>(self);
-        if (chip->input_read_ == chip->input_.size()) {
-          chip->stop(Reason::kIllegalAccess, "read past the end of the input stream");
-          return 0;
-        }
-        return static_cast<uint8_t>(chip->input_[chip->input_read_++]);
-      },
+      [](avr_t*, avr_io_addr_t, void* self) { return static_cast<Chip*>(self)->next_input(); },
       this);
+}
+
+uint8_t Chip::next_input() {
+  if (raw_ && input_read_ == input_.size()) {
+    const std::string written = output_.substr(output_told_);
+    output_told_ = output_.size();
+    tell({Event::Kind::kInput, avr_->cycle, written, false});
+  }
+  if (input_read_ == input_.size()) {
+    stop(Reason::kIllegalAccess, "read past the end of the input stream");
+    return 0;
+  }
+  return static_cast<uint8_t>(input_[input_read_++]);
 }
 
 /// A watchdog that has reset the chip goes on, with its shortest time.
@@ -262,6 +269,11 @@ void Chip::tell(const Event& event) {
   const Reaction reaction = world_.react(event);
   for (const Message& message : reaction.messages) {
     uart_->send(event.cycle + message.delay, message.text + '\n');
+  }
+  if (!reaction.input.empty()) {
+    input_.erase(0, input_read_);
+    input_read_ = 0;
+    input_ += reaction.input;
   }
   if (reaction.cut) {
     const Cycle when = event.cycle + reaction.cut_delay;

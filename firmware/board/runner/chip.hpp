@@ -54,6 +54,7 @@ struct ChipOptions {
   Reason at_limit = Reason::kLimit;
   std::vector<std::string> watched_pins;  ///< "PORTB7", or "all"
   std::string input;                      ///< for board::read
+  bool raw = false;  ///< where `input` ends the world is asked, and told what was written
   ResetCause cause = ResetCause::kPowerOn;
   std::string eeprom;  ///< what it holds at the start; see Eeprom
   Cycle cut = 0;       ///< when the power goes off, if it does (not 0)
@@ -96,6 +97,7 @@ class Chip {
   void start_by(ResetCause cause);
   void cut_after(Cycle delay);
   void connect_registers();
+  uint8_t next_input();
   void tell(const Event& event);
   void on_serial(Cycle when, uint8_t byte);
   void stop(Reason reason, const std::string& message);
@@ -135,7 +137,9 @@ class Chip {
   std::vector<PinChange> pin_changes_;
   std::string input_;
   size_t input_read_ = 0;
+  bool raw_;
   std::string output_;
+  size_t output_told_ = 0;
   std::string serial_;
   std::string line_;
 };

@@ -37,6 +37,7 @@ Runs an AVR program on a simulated chip until it calls board::finish().
   --answers FILE    CSV, columns delay_ms,text: answers to the chip's requests on USART0
   --request PREFIX  how a request begins (?)
   --interactive     the world is played through stdin and stdout (protocol: runner/world.hpp)
+  --raw             with --interactive: the bytes of board::read() and board::write() pass there, too
   --eeprom FILE     what the EEPROM holds, kept there at the end; a file that is not there is erased
                     memory
   --reset-cause WHY what MCUSR says: power-on (the default), external, brown-out or watchdog
@@ -96,6 +97,7 @@ Options parse(int argc, char** argv) {
                           {"answers", required_argument, nullptr, 'a'},
                           {"request", required_argument, nullptr, 'q'},
                           {"interactive", no_argument, nullptr, 'x'},
+                          {"raw", no_argument, nullptr, 'b'},
                           {"watch", required_argument, nullptr, 'w'},
                           {"report", required_argument, nullptr, 'r'},
                           {"eeprom", required_argument, nullptr, 'e'},
@@ -138,6 +140,9 @@ Options parse(int argc, char** argv) {
       case 'x':
         options.interactive = true;
         break;
+      case 'b':
+        options.chip.raw = true;
+        break;
       case 'w':
         options.chip.watched_pins.push_back(optarg);
         break;
@@ -168,6 +173,7 @@ Options parse(int argc, char** argv) {
   if (options.interactive && !options.answers.empty()) {
     throw UsageError("--interactive and --answers are two worlds: choose one");
   }
+  if (options.chip.raw && !options.interactive) throw UsageError("--raw needs --interactive");
   if (options.interactive && options.serial == "-") {
     throw UsageError("--serial - and --interactive both want stdout");
   }

@@ -15,6 +15,33 @@ bool starts_with(const std::string& text, const std::string& prefix) {
   return text.compare(0, prefix.size(), prefix) == 0;
 }
 
+std::string to_hex(const std::string& bytes) {
+  constexpr char kDigits[] = "0123456789abcdef";
+  std::string text;
+  text.reserve(2 * bytes.size());
+  for (const char byte : bytes) {
+    text.push_back(kDigits[static_cast<uint8_t>(byte) >> 4]);
+    text.push_back(kDigits[byte & 0x0f]);
+  }
+  return text;
+}
+
+/// Appends the bytes to `out`; false where the text is not pairs of hexadecimal digits.
+bool from_hex(const std::string& text, std::string& out) {
+  if (text.size() % 2 != 0) return false;
+  for (size_t i = 0; i < text.size(); ++i) {
+    const std::string digits = "0123456789abcdef";
+    const size_t digit = digits.find(text[i]);
+    if (digit == std::string::npos) return false;
+    if (i % 2 == 0) {
+      out.push_back(static_cast<char>(digit << 4));
+    } else {
+      out.back() = static_cast<char>(static_cast<uint8_t>(out.back()) | digit);
+    }
+  }
+  return true;
+}
+
 }  // namespace
 
 AnswersWorld::AnswersWorld(const std::string& path, std::string request, uint32_t frequency)
@@ -57,6 +84,9 @@ Reaction InteractiveWorld::react(const Event& event) {
     case Event::Kind::kPin:
       std::cout << "pin " << event.cycle << ' ' << event.text << ' ' << event.level;
       break;
+    case Event::Kind::kInput:
+      std::cout << "input " << event.cycle << ' ' << to_hex(event.text);
+      break;
   }
   std::cout << std::endl;
 
@@ -65,6 +95,7 @@ Reaction InteractiveWorld::react(const Event& event) {
   while (std::getline(std::cin, command)) {
     if (command == "go") return reaction;
     if (command == "stop") break;
+    if (starts_with(command, "feed ") && from_hex(command.substr(5), reaction.input)) continue;
     std::istringstream words(command);
     std::string verb;
     Message message{};

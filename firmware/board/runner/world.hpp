@@ -1,4 +1,4 @@
-/// What is around the chip: it sees what the chip does and sends serial lines to it.
+/// What is around the chip: it sees what the chip does, and sends serial lines and bytes to it.
 #pragma once
 
 #include <string>
@@ -10,11 +10,13 @@ namespace auvest_board {
 
 /// Something the chip did, or the start of the run.
 struct Event {
-  enum class Kind { kStart, kLine, kPin };
+  enum class Kind { kStart, kLine, kPin, kInput };
   Kind kind;
-  Cycle cycle;       ///< kLine: when the stop bit of its newline had passed
-  std::string text;  ///< kLine: without the line's end; kPin: the pin's name
-  bool level;        ///< kPin: the new level
+  Cycle cycle;  ///< kLine: when the stop bit of its newline had passed
+  /// kLine: without the line's end; kPin: the pin's name; kInput: what board::write() has written
+  /// since the last of these events.
+  std::string text;
+  bool level;  ///< kPin: the new level
 };
 
 /// A line for the chip; its first start bit comes this long after the event.
@@ -25,6 +27,7 @@ struct Message {
 
 struct Reaction {
   std::vector<Message> messages;
+  std::string input;    ///< for board::read(), at once
   bool stop = false;    ///< end the run here
   bool cut = false;     ///< the power goes off ...
   Cycle cut_delay = 0;  ///< ... this long after the event
@@ -61,11 +64,15 @@ class AnswersWorld : public World {
 ///     start 0                 the chip is about to start
 ///     line CYCLE TEXT         it has sent a line
 ///     pin CYCLE NAME LEVEL    a watched pin has changed
+///     input CYCLE BYTES       with --raw: board::read() waits for bytes; BYTES is what
+///                             board::write() has written since the last of these, two hexadecimal
+///                             digits each
 ///
 /// After each the chip stands still until `go`; before it may come any number of
 ///
 ///     send DELAY TEXT         send TEXT and a newline, beginning DELAY cycles after the event
 ///     cut DELAY               the power goes off DELAY cycles after the event
+///     feed BYTES              bytes for board::read(), which are there at once
 ///
 /// `stop` instead of `go`, or the end of stdin, ends the run. The last line on stdout is the
 /// report, one line of JSON: report {...}

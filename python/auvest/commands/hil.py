@@ -43,7 +43,7 @@ from auvest.errors import FilterError, ModelError
 from auvest.firmware import hil
 from auvest.firmware.hil import SERIAL, TARGETS, HilError, Leg
 from auvest.firmware.hil_bench import bench
-from auvest.firmware.hil_record import Record, Words, on_desk, record_of
+from auvest.firmware.hil_record import Record, Words, record_of
 from auvest.firmware.hil_serial import LineLost
 from auvest.firmware.simulator import SimulatorError
 from auvest.firmware.sketch import SketchError
@@ -97,7 +97,7 @@ def command(
     new = terminal.new_folder(output, "hil", force=force)
     with terminal.usage_errors(), terminal.writing(new.path):
         bench(record).write(new.part, serial=True)
-        desk = on_desk(record)
+        desk = record.on_desk()
         legs = []
         for one in targets:
             with (

@@ -1,7 +1,7 @@
 """Hardware in the loop: a record through one filter on the desk and on a chip, bit by bit.
 
-:func:`run` plays a :class:`~auvest.firmware.hil_record.Record` to a target and compares what comes
-back with Python's filter in float32.
+:func:`run` plays a :class:`~auvest.firmware.hil_record.Record` (or ``SlatRecord``, of a filter that
+localises and tracks) to a target and compares what comes back with Python's filter in float32.
 """
 
 from __future__ import annotations
@@ -17,11 +17,12 @@ import numpy as np
 import numpy.typing as npt
 
 from auvest._headers import firmware_folder, include_folders
-from auvest.board import Board
+from auvest.board import Board, WaitsForInput
 from auvest.firmware import simulator
 from auvest.firmware.hil_bench import Bench, answer_of, bench
-from auvest.firmware.hil_record import Record, Words, on_desk
+from auvest.firmware.hil_record import Record, Words
 from auvest.firmware.hil_serial import over_serial
+from auvest.firmware.hil_slat import SlatRecord
 from auvest.firmware.package import package
 from auvest.firmware.sketch import Compiled, compile_sketch
 from auvest.models._compile import find_compiler
@@ -125,13 +126,13 @@ class Leg:
     microseconds: npt.NDArray[np.uint32] | None
     figures: dict[str, int] = field(default_factory=dict)
 
-    def awake_share(self, record: Record) -> float | None:
+    def awake_share(self, record: Record | SlatRecord) -> float | None:
         """Give the share of the record's time in which the filter computes, where it is known."""
         if self.microseconds is None or not record.dt.sum() > 0:
             return None
         return 1e-6 * float(self.microseconds[1:].sum()) / float(record.dt.sum(dtype=float))
 
-    def document(self, record: Record) -> dict[str, Any]:
+    def document(self, record: Record | SlatRecord) -> dict[str, Any]:
         """For JSON."""
         return {
             "target": self.target,
@@ -150,7 +151,7 @@ class Leg:
 
 
 def run(
-    record: Record,
+    record: Record | SlatRecord,
     target: str,
     folder: Path,
     *,
@@ -162,18 +163,18 @@ def run(
 
     Parameters
     ----------
-    record : Record
+    record : Record or SlatRecord
         What is played.
     target : str
         One of :data:`TARGETS`, or ``serial:PORT``.
     folder : Path
         For sources and programs.
     desk : ndarray, optional
-        What :func:`on_desk` gives for the record.
+        What ``record.on_desk()`` gives.
     flags : sequence of str
         Further flags of the compiler, on the computer and on Cortex-M.
     progress : callable, optional
-        Called with the rows that are done, and all, over a serial line.
+        Called with the rows that are done, and all, where they go one by one.
 
     Raises
     ------
@@ -190,7 +191,7 @@ def run(
     if target == "host":
         lines = _on_host(program, folder, flags)
     elif target == "atmega2560":
-        lines = _on_avr(program, folder, figures)
+        lines = _on_avr(program, folder, figures, progress)
     elif target in CORTEX:
         lines = _on_cortex(program, folder, target, flags)
     elif target.startswith(SERIAL):
@@ -198,7 +199,7 @@ def run(
     else:
         raise ValueError(f"target must be {', '.join(TARGETS)} or serial:PORT, not {target!r}")
     answers = _table(lines, program, len(record.fields))
-    desk = on_desk(record) if desk is None else desk
+    desk = record.on_desk() if desk is None else desk
     words = np.delete(answers, (_NUMBER, _MICROSECONDS), axis=1)
     difference = first_difference(words, desk, record.fields)
     clock = answers[:, _MICROSECONDS].astype(np.uint32)
@@ -292,17 +293,23 @@ def _on_cortex(program: Bench, folder: Path, target: str, flags: Sequence[str]) 
     return _play(program, folder, target, lambda files: qemu(machine, built, files))
 
 
-def _on_avr(program: Bench, folder: Path, figures: dict[str, int]) -> list[str]:
+def _on_avr(
+    program: Bench, folder: Path, figures: dict[str, int], progress: Progress | None
+) -> list[str]:
     runner = simulator.find_or_build()
     compiled = build_sketch(program, folder)
-    rows, answers = _files(program, folder, "atmega2560")
-    with rows.open("a", encoding="ascii") as file:
-        file.write("\x04")  # end of transmission
     # A row takes some tenths of a second at most.
     limit_s = 60.0 + len(program.rows)
-    board = Board(compiled.elf, runner=runner, limit_s=limit_s, input=rows, output=answers)
-    with board:
-        report = board.run()
+    answers = []
+    with Board(compiled.elf, runner=runner, limit_s=limit_s, raw=True) as board:
+        waits = (event for event in board if isinstance(event, WaitsForInput))
+        for k, row in enumerate(program.rows):
+            answers.append(next(waits).output)
+            board.feed(f"{row}\n".encode("ascii"))
+            if progress is not None:
+                progress(k, len(program.rows) - 1)
+        answers.append(next(waits).output)
+    report = board.report
     step = report.sections[1]
     figures.update(
         flash_bytes=compiled.flash,
@@ -312,7 +319,7 @@ def _on_avr(program: Bench, folder: Path, figures: dict[str, int]) -> list[str]:
         cycles_median=step.median,
         cycles_max=step.maximum,
     )
-    return answers.read_text("ascii").splitlines()
+    return b"".join(answers).decode("ascii").splitlines()
 
 
 def build_sketch(program: Bench, folder: Path, *, serial: bool = False) -> Compiled:

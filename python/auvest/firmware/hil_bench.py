@@ -1,6 +1,7 @@
 """The program of `auvest hil`: a bench for one filter with its models, and the rows for it.
 
-The sources are ``firmware/bench``; ``bench.hpp.in`` there says what passes over the line.
+The sources are ``firmware/bench``; ``rows.hpp`` there and the header of each family say what passes
+over the line.
 """
 
 from __future__ import annotations
@@ -8,14 +9,17 @@ from __future__ import annotations
 import re
 import shutil
 import zlib
+from collections import deque
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 
 from auvest._headers import firmware_folder
+from auvest.firmware import hil_slat
 from auvest.firmware.cost import assigned, literal, made, registered
-from auvest.firmware.hil_record import Record, Words, bits, place_given, place_names
+from auvest.firmware.hil_record import Record, bits, place_given, place_names
+from auvest.firmware.hil_slat import SlatRecord
 from auvest.models import MeasurementModel
 from auvest.telemetry import LineError, body_of, frame
 
@@ -51,7 +55,7 @@ class Bench:
         text = (source / "bench" / "bench.ino.in").read_text(encoding="utf-8")
         text = text.replace("@SERIAL@", str(int(serial)))
         (sketch / "bench.ino").write_text(text, encoding="utf-8")
-        for path in ("bench/frames.hpp", "bench/port.hpp", "board/board.hpp"):
+        for path in ("bench/frames.hpp", "bench/rows.hpp", "bench/port.hpp", "board/board.hpp"):
             shutil.copy(source / path, sketch)
         return sketch
 
@@ -65,7 +69,7 @@ class _Sensor:
     changing: tuple[str, ...]
 
 
-def bench(record: Record) -> Bench:
+def bench(record: Record | SlatRecord) -> Bench:
     """Write the program for a record.
 
     Raises
@@ -73,10 +77,16 @@ def bench(record: Record) -> Bench:
     ValueError
         If a model is not one of the registry.
     """
-    sensors = _sensors(record)
-    header = _header(record, sensors)
+    if isinstance(record, SlatRecord):
+        template, places, rows = "slat.hpp.in", hil_slat.places(record), hil_slat.rows(record)
+    else:
+        sensors = _sensors(record)
+        template, places, rows = "gaussian.hpp.in", _places(record, sensors), _rows(record, sensors)
+    text = (firmware_folder() / "bench" / template).read_text(encoding="utf-8")
+    header = re.sub(r"@(?!DIGEST)(\w+)@", lambda place: places[place[1]], text)
     digest = zlib.crc32(header.encode())
-    return Bench(header.replace("@DIGEST@", f"0x{digest:08x}"), digest, _rows(record, sensors))
+    header = header.replace("@DIGEST@", f"0x{digest:08x}")
+    return Bench(header, digest, [row_frame(k, *words) for k, words in enumerate(rows)])
 
 
 def row_frame(*words: int) -> str:
@@ -98,13 +108,13 @@ def answer_of(line: str) -> tuple[str, list[int]]:
     return kind, [int(word, 16) for word in words]
 
 
-def _rows(record: Record, sensors: dict[str, _Sensor]) -> list[str]:
-    """Write the start and all rows as frames."""
+def _rows(record: Record, sensors: dict[str, _Sensor]) -> list[list[int]]:
+    """Give the words of the start and of all rows, without their numbers."""
     measured, placed = record.measured, place_given(record)
     names = list(sensors)
     most = max(len(sensor.changing) for sensor in sensors.values())
     values = [model._core_params() for model in record.sensors]
-    frames = [row_frame(0, *record.start.tolist())]
+    frames: list[list[int]] = [record.start.tolist()]
     for k in range(len(record)):
         model = record.sensors[record.sensor[k]]
         sensor = sensors[model.core_name]
@@ -116,14 +126,10 @@ def _rows(record: Record, sensors: dict[str, _Sensor]) -> list[str]:
         settings += [0.0] * (most - len(settings))
         flags = int(measured[k]) | names.index(model.core_name) << 8
         z = np.nan_to_num(record.z[k])
-        numbers = np.concatenate([[record.dt[k]], z, record.input[k], settings])
-        frames.append(row_frame(k + 1, flags, *_integers(bits(numbers))))
+        age = [] if record.age is None else [record.age[k]]
+        numbers = np.concatenate([[record.dt[k]], z, record.input[k], settings, age])
+        frames.append([flags, *bits(numbers).tolist()])
     return frames
-
-
-def _integers(words: Words) -> list[int]:
-    integers: list[int] = words.tolist()
-    return integers
 
 
 def _sensors(record: Record) -> dict[str, _Sensor]:
@@ -152,37 +158,61 @@ def _type(name: str, states: int) -> str:
     return re.sub(r"\bN\b", str(states), types[name].replace("Scalar", "float"))
 
 
-def _header(record: Record, sensors: dict[str, _Sensor]) -> str:
-    """Fill the places of bench.hpp.in, but for the digest."""
+def _places(record: Record, sensors: dict[str, _Sensor]) -> dict[str, str]:
+    """Give what stands in the places of gaussian.hpp.in."""
     filter_ = record.filter
-    kernel, policy = filter_.kernel, filter_.policy
     kind = next(name for name, number in _KINDS.items() if number == filter_._linearisation)
-    types, make = _filter(record, kind)
+    types, make, inside = _inside(record, kind)
     update = []
     for i, sensor in enumerate(sensors.values()):
         make += [f"using Sensor{i} = {sensor.type};"]
         make += [made(sensor.model, f"Sensor{i}", f"make_sensor_{i}")]
         make += [f"Sensor{i} sensor_{i} = make_sensor_{i}();", ""]
-        update.append(f"    case {i}:")
+        update.append(f"      case {i}:")
         if sensor.changing:
             make += [*_setter(i, sensor), ""]
-            update.append(f"      set(sensor_{i});")
-            update.append(
-                f"      if (sensor_{i}.check() != Status::kOk) return sensor_{i}.check();"
-            )
-        update.append(f"      return correct(sensor_{i});")
+            update.append(f"        set(sensor_{i}, seen);")
+        update.append(f"        return correct(z, sensor_{i});")
     inputs = record.input.shape[1]
-    predict = ["  Status status = filter.predict(number(2));"]
+    driven = []
     if inputs:
-        predict = [
+        driven = [
             "  Process::Input input;",
             "  for (uint8_t i = 0; i < kInputs; ++i) input(i) = number(kInput + i);",
-            "  Status status = filter.predict(number(2), input);",
         ]
+    given = ", input" if inputs else ""
+    predict = f"  Status status = filter.predict(number(2){given});"
+    correct = ["  return filter.update(z, seen);"]
+    reset = ["  Status status = filter.reset(x, P);"]
+    if filter_.longest_step_s != 3600:
+        reset.insert(0, f"  filter.limit_steps({literal(filter_.longest_step_s)});")
+    if filter_.headings > 1:
+        several = f"static_cast<Inside&>(filter).reset(x, P, {filter_.headings})"
+        reset.append(f"  if (status == Status::kOk) status = {several};")
+    made_filter = [*_policy(record), f"Filter filter = {_whole(record, inside)};"]
+    if record.age is not None:
+        made_filter += [
+            f"constexpr float kLate = {literal(filter_.late_s)};",
+            "using Event = auvest::LateEvent<Seeing, Seen>;",
+            "using Memory ="
+            f" auvest::LateMemory<Seeing, Seen, auvest::EventArray<Event, {_events(record)}>>;",
+            "Memory memory(filter);",
+        ]
+        predict = f"  Status status = memory.predict(filter, number(2), {given[2:] or '{}'});"
+        # An age may be a sum that was rounded.
+        correct = [
+            "  const float age = number(kAge);",
+            "  if (age > kLate * 1.00001f) return Report(Status::kTimeBackwards);",
+            "  return memory.update(filter, z, seen, age);",
+        ]
+        reset.append("  if (status == Status::kOk) memory.restart(filter);")
     feedback, show = [], []
-    if kernel is not None:
-        show.append("  for (float value : weight) out.word(auvest::math::to_bits(value));")
-    if policy is not None:
+    if filter_.kernel is not None:
+        show.append("  for (float value : last.weight) put(out, value);")
+    if filter_.components > 1:
+        show.append("  put(out, static_cast<float>(filter.size()));")
+        show.append("  put(out, static_cast<float>(static_cast<uint8_t>(filter.convergence())));")
+    if filter_.policy is not None:
         second = min(1, len(filter_.x) - 1)
         feedback = [
             "  if (status != Status::kOk) return status;",
@@ -191,39 +221,50 @@ def _header(record: Record, sensors: dict[str, _Sensor]) -> str:
             f"  here(1) = filter.x()({second});",
             "  status = filter.feedback(here);",
         ]
-        show.append("  out.word(auvest::math::to_bits(filter.interval()));")
-    limit = []
-    if filter_.longest_step_s != 3600:
-        limit = [f"  filter.limit_steps({literal(filter_.longest_step_s)});"]
-    places = {
+        show.append("  put(out, filter.interval());")
+    return {
         "PROCESS": _type(filter_.process.core_name, len(filter_.x)),
         "KIND": kind,
         "TYPES": "\n".join(types),
         "SIZE": str(record.z.shape[1]),
         "INPUTS": str(inputs),
         "SETTINGS": str(max(len(sensor.changing) for sensor in sensors.values())),
-        "MAKE": "\n".join(make).rstrip(),
+        "AGES": str(int(record.age is not None)),
+        "MAKE": _lines(make),
         "UPDATE": _lines(update),
-        "PREDICT": _lines(predict),
+        "FILTER": "\n".join(made_filter),
+        "CORRECT": _lines(correct),
+        "PREDICT": _lines([*driven, predict]),
         "FEEDBACK": _lines(feedback),
-        "LIMIT": _lines(limit),
+        "RESET": _lines([*reset, "  return status;"]),
         "SHOW": _lines(show),
-        "DIGEST": "@DIGEST@",
     }
-    text = (firmware_folder() / "bench" / "bench.hpp.in").read_text(encoding="utf-8")
-    return re.sub(r"@(\w+)@", lambda place: places[place[1]], text)
 
 
 def _lines(lines: list[str]) -> str:
     return "".join(f"{line}\n" for line in lines)
 
 
-def _filter(record: Record, kind: str) -> tuple[list[str], list[str]]:
-    """Write the types of the filter, and what makes it as it is on the desk."""
+def _events(record: Record) -> int:
+    """Count the events that the late memory of the desk holds at most, and two to spare."""
+    events: deque[float] = deque()
+    reach = most = 0.0
+    for dt, measured in zip(record.dt.tolist(), record.measured, strict=True):
+        for step in (dt, 0.0) if measured else (dt,):
+            while events and reach - events[0] >= record.filter.late_s:
+                reach -= events.popleft()
+            events.append(step)
+            reach += step
+            most = max(most, len(events))
+    return int(most) + 2
+
+
+def _inside(record: Record, kind: str) -> tuple[list[str], list[str], str]:
+    """Give types, functions that make them, and the value of the filter without its policy."""
     filter_ = record.filter
-    kernel, recovery, policy = filter_.kernel, filter_.recovery, filter_.policy
+    kernel, recovery = filter_.kernel, filter_.recovery
     make = [made(filter_.process, "Process", "make_process"), ""]
-    filter_type, value = "Plain", "Plain(make_process())"
+    type_, value = "Plain", "Plain(make_process())"
     types = []
     if kind == "Ukf":
         points = {"alpha", "beta", "kappa"}
@@ -237,15 +278,17 @@ def _filter(record: Record, kind: str) -> tuple[list[str], list[str]]:
             "",
         ]
         value = "make_plain()"
-    if kernel is not None:
+    if kernel is not None or filter_.components > 1:
+        of_kernel = "Unit" if kernel is None else type(kernel).__name__
         of_recovery = "NoRecovery" if recovery is None else "RejectionStreak"
-        types.append(f"using Kernel = auvest::{type(kernel).__name__}<float>;")
+        types.append(f"using Kernel = auvest::{of_kernel}<float>;")
         types.append(f"using Rule = auvest::RobustUpdate<Kernel, auvest::{of_recovery}<float>>;")
         types.append("using Guarded = auvest::Robust<Plain, Rule>;")
         options = filter_._options
         residual = {"innovation": "kInnovation", "post-fit": "kPostFit"}[filter_.residual]
         make += ["Rule make_rule() {", "  Rule rule;"]
-        make += assigned("rule.kernel.params", asdict(kernel))
+        if kernel is not None:
+            make += assigned("rule.kernel.params", asdict(kernel))
         if recovery is not None:
             make.append(f"  rule.recovery.params.rejections = {recovery.rejections};")
         make += [
@@ -256,25 +299,37 @@ def _filter(record: Record, kind: str) -> tuple[list[str], list[str]]:
             "}",
             "",
         ]
-        filter_type, value = "Guarded", f"Guarded({value}, make_rule())"
-    if policy is not None:
-        types.append(f"using Policy = auvest::{type(policy).__name__}<float>;")
-        law = {name: x for name, x in asdict(policy).items() if name != "preset"}
-        make += ["Policy make_policy() {", "  Policy::Params params;"]
-        make += [*assigned("params", law), "  return Policy(params);", "}", ""]
-        filter_type = f"auvest::AdaptiveInterval<{filter_type}, Policy>"
-        value = f"Filter({value}, make_policy())"
-    types.append(f"using Filter = {filter_type};")
-    return types, [*make, f"Filter filter = {value};", ""]
+        type_, value = "Guarded", f"Guarded({value}, make_rule())"
+    if filter_.components > 1:
+        type_ = f"auvest::GaussianSum<Guarded, {filter_.components}>"
+        value = f"Inside({value})"
+    types.append(f"using Inside = {type_};")
+    return types, make, value
+
+
+def _policy(record: Record) -> list[str]:
+    """Write the type of the filter, and what makes its policy."""
+    policy = record.filter.policy
+    if policy is None:
+        return ["using Filter = Seeing;"]
+    law = {name: x for name, x in asdict(policy).items() if name != "preset"}
+    lines = [f"using Policy = auvest::{type(policy).__name__}<float>;"]
+    lines += ["Policy make_policy() {", "  Policy::Params params;"]
+    lines += [*assigned("params", law), "  return Policy(params);", "}", ""]
+    return [*lines, "using Filter = auvest::AdaptiveInterval<Seeing, Policy>;"]
+
+
+def _whole(record: Record, inside: str) -> str:
+    if record.filter.policy is None:
+        return f"Filter({inside})"
+    return f"Filter(Seeing({inside}), make_policy())"
 
 
 def _setter(i: int, sensor: _Sensor) -> list[str]:
     """Write the function that gives a sensor what the row says of it."""
     order = list(sensor.model._core_defaults())
-    lines = [f"void set(Sensor{i}& sensor) {{", "  uint8_t i = 0;"]
-    lines.append("  sensor.params.visit([&i](const char*, float& value) {")
+    lines = [f"void set(Sensor{i}& sensor, const Seen& seen) {{", "  uint8_t i = 0;"]
+    lines.append("  sensor.params.visit([&i, &seen](const char*, float& value) {")
     for k, name in enumerate(sensor.changing):
-        lines.append(
-            f"    if (i == {order.index(name)}) value = number(kSetting + {k});  // {name}"
-        )
+        lines.append(f"    if (i == {order.index(name)}) value = seen.setting[{k}];  // {name}")
     return [*lines, "    ++i;", "  });", "}"]

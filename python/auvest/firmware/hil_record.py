@@ -2,7 +2,7 @@
 
 A row is a prediction and at most one measurement. :func:`record_of` takes the rows of a log as
 ``auvest replay`` gives them to the filter; :class:`Record` may also be made by hand, of any filter
-with models of the registry. :func:`on_desk` gives the bits that every chip must find.
+with models of the registry. ``on_desk`` gives the bits that every chip must find.
 """
 
 from __future__ import annotations
@@ -50,6 +50,8 @@ class Record:
         What drives the process; k is 0 where nothing does.
     place : ndarray, shape (T, p)
         What ``sensor.place`` names, then; NaN: as the model has it. p is 0 where all are.
+    age : ndarray, shape (T,), optional
+        How long before the row it was measured, s, where the filter has ``late_s``; default: 0.
     """
 
     filter: GaussianFilter
@@ -59,18 +61,21 @@ class Record:
     z: _Numbers
     input: _Numbers
     place: _Numbers
+    age: _Numbers | None = None
 
     def __post_init__(self) -> None:
         filter_ = self.filter
         if filter_.dtype != np.float32:
             raise ValueError(f"the filter must be in float32, not in {filter_.dtype}")
-        columns = (self.sensor, self.dt, self.z, self.input, self.place)
+        columns = [self.sensor, self.dt, self.z, self.input, self.place]
+        if self.age is not None:
+            columns.append(self.age)
+            if filter_.late_s == 0:
+                raise ValueError("age is for a filter with late_s")
         if len({len(column) for column in columns}) != 1:
-            raise ValueError("sensor, dt, z, input and place must have the same number of rows")
-        if filter_.components > 1:
-            raise ValueError("[filter] components must be 1: a bench has one Gaussian")
-        if filter_.late_s > 0:
-            raise ValueError("late_s must be 0: a bench takes measurements as they come")
+            raise ValueError(
+                "sensor, dt, z, input, place and age must have the same number of rows"
+            )
 
     def __len__(self) -> int:
         return len(self.dt)
@@ -95,7 +100,50 @@ class Record:
         names.append("nis")
         if self.filter.kernel is not None:
             names += [f"weight[{i}]" for i in range(self.z.shape[1])]
+        if self.filter.components > 1:
+            names += ["components", "convergence"]
         return [*names, "interval"] if self.filter.policy is not None else names
+
+    def on_desk(self) -> Words:
+        """Give the bits after the start and after each row, shape (T + 1, fields)."""
+        filter_ = in_float32(self.filter)
+        lower = np.tril_indices(len(filter_.x))
+        weights = np.full(self.z.shape[1] if filter_.kernel is not None else 0, np.nan, np.float32)
+        measured = self.measured
+        placed = place_given(self)
+        places = [len(place_names(model)) for model in self.sensors]
+        lines = []
+        for k in range(-1, len(self)):
+            said, nis, weight = int(Status.ok), np.nan, weights.copy()
+            if k >= 0:
+                model = self.sensors[self.sensor[k]]
+                size = len(model.measures)
+                try:
+                    filter_.predict(
+                        float(self.dt[k]), self.input[k] if self.input.shape[1] else None
+                    )
+                    if measured[k]:
+                        place = self.place[k, : places[self.sensor[k]]] if placed[k] else None
+                        age = None if self.age is None else float(self.age[k])
+                        filter_.update(self.z[k, :size], model, place=place, age_s=age)
+                        report = filter_.report
+                        assert report is not None
+                        nis = report.nis
+                        weight[:size] = report.weight[: len(weight)]
+                        said |= int(report.decision) << 8 | int(report.near_field) << 16
+                        said |= int(report.recovered) << 24
+                    if filter_.policy is not None:
+                        filter_.feedback()
+                except FilterError as error:
+                    said |= int(error.status)
+            numbers = [filter_.x, filter_.P[lower], np.array([nis]), weight]
+            if filter_.components > 1:
+                numbers.append(np.array([len(filter_.mixture.weight), filter_.convergence]))
+            if filter_.policy is not None:
+                numbers.append(np.array([filter_.interval]))
+            floats = bits(np.concatenate(numbers).astype(np.float32))
+            lines.append(np.concatenate([np.array([said], np.uint32), floats]))
+        return np.array(lines)
 
 
 def record_of(
@@ -152,12 +200,11 @@ class _Heard:
         models = given if isinstance(given, list) else [given] * len(z)
         numbers = {id(model): self._number(model) for model in models}
         which = np.array([numbers[id(model)] for model in models], int)
-        if "age_s" in rows:
-            raise ValueError("a record has no late measurements: latency_s is for auvest replay")
         z = np.reshape(z, (len(z), -1))
         driven = rows.get("input", np.empty((len(z), 0)))
         place = rows.get("place", np.empty((len(z), 0)))
-        self._parts.append((which, rows["dt"], z, driven, place))
+        age = rows.get("age_s", np.zeros(len(z)))
+        self._parts.append((which, rows["dt"], z, driven, place, age))
         self._count += len(z)
 
     def _number(self, model: MeasurementModel) -> int:
@@ -170,9 +217,16 @@ class _Heard:
         if self._start is None:
             raise ValueError("the log has no row for a filter")
         which, *columns = (_joined(part) for part in zip(*self._parts, strict=True))
-        dt, z, driven, place = (column[: self._most].astype(np.float32) for column in columns)
+        dt, z, driven, place, age = (c[: self._most].astype(np.float32) for c in columns)
         return Record(
-            self._start, tuple(self._sensors.values()), which[: self._most], dt, z, driven, place
+            filter=self._start,
+            sensors=tuple(self._sensors.values()),
+            sensor=which[: self._most],
+            dt=dt,
+            z=z,
+            input=driven,
+            place=place,
+            age=age if self._start.late_s > 0 else None,
         )
 
 
@@ -204,45 +258,6 @@ def in_float32(filter_: GaussianFilter) -> GaussianFilter:
         recovery=filter_.recovery,
         **options,
     )
-
-
-def on_desk(record: Record) -> Words:
-    """Give the bits after the start and after each row, shape (T + 1, fields): the right ones."""
-    filter_ = in_float32(record.filter)
-    lower = np.tril_indices(len(filter_.x))
-    weights = np.full(record.z.shape[1] if filter_.kernel is not None else 0, np.nan, np.float32)
-    measured = record.measured
-    placed = place_given(record)
-    places = [len(place_names(model)) for model in record.sensors]
-    lines = []
-    for k in range(-1, len(record)):
-        said, nis, weight = int(Status.ok), np.nan, weights.copy()
-        if k >= 0:
-            model = record.sensors[record.sensor[k]]
-            size = len(model.measures)
-            try:
-                filter_.predict(
-                    float(record.dt[k]), record.input[k] if record.input.shape[1] else None
-                )
-                if measured[k]:
-                    place = record.place[k, : places[record.sensor[k]]] if placed[k] else None
-                    filter_.update(record.z[k, :size], model, place=place)
-                    report = filter_.report
-                    assert report is not None
-                    nis = report.nis
-                    weight[:size] = report.weight[: len(weight)]
-                    said |= int(report.decision) << 8 | int(report.near_field) << 16
-                    said |= int(report.recovered) << 24
-                if filter_.policy is not None:
-                    filter_.feedback()
-            except FilterError as error:
-                said |= int(error.status)
-        numbers = [filter_.x, filter_.P[lower], np.array([nis]), weight]
-        if filter_.policy is not None:
-            numbers.append(np.array([filter_.interval]))
-        floats = bits(np.concatenate(numbers).astype(np.float32))
-        lines.append(np.concatenate([np.array([said], np.uint32), floats]))
-    return np.array(lines)
 
 
 def place_given(record: Record) -> npt.NDArray[np.bool_]:

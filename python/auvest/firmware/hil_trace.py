@@ -10,10 +10,14 @@ import pyarrow as pa
 import pyarrow.parquet as pa_parquet
 
 from auvest.firmware.hil_record import Record, Words
+from auvest.firmware.hil_slat import SlatRecord
 
 
 def write_trace(
-    path: Path, record: Record, words: Words, microseconds: npt.NDArray[np.uint32] | None
+    path: Path,
+    record: Record | SlatRecord,
+    words: Words,
+    microseconds: npt.NDArray[np.uint32] | None,
 ) -> None:
     """Write a row for the start and for each row: time, what the status holds, and all floats.
 
@@ -21,7 +25,7 @@ def write_trace(
     ----------
     path : Path
         The Parquet file.
-    record : Record
+    record : Record or SlatRecord
         What was played.
     words : ndarray of uint32, shape (T + 1, fields)
         What came back.
@@ -35,10 +39,11 @@ def write_trace(
         "time_s": np.cumsum(dt),
         "dt_s": dt,
         "status": (said & 0xFF).astype(np.uint8),
-        "decision": (said >> 8 & 0xFF).astype(np.uint8),
-        "near_field": (said >> 16 & 0xFF).astype(bool),
-        "recovered": (said >> 24 & 0xFF).astype(bool),
     }
+    if isinstance(record, Record):
+        columns["decision"] = (said >> 8 & 0xFF).astype(np.uint8)
+        columns["near_field"] = (said >> 16 & 0xFF).astype(bool)
+        columns["recovered"] = (said >> 24 & 0xFF).astype(bool)
     for name, column in zip(record.fields[1:], words.T[1:], strict=True):
         columns[name] = np.ascontiguousarray(column).view(np.float32)
     if microseconds is not None:

@@ -97,6 +97,26 @@ TEST_CASE("late updates: a time between two steps is that of the nearer") {
   }
 }
 
+TEST_CASE("late updates: of a process without input") {
+  using Coasting = auvest::Ekf<auvest::WhiteAcceleration<float, 2>>;
+  using Fix = auvest::Position<float, 4, 2>;
+  const Matrix<float, 4, 4> P = Matrix<float, 4, 4>::Identity();
+  const Vector<float, 4> x(0, 0, 1, 0.5f);
+  Coasting plain;
+  auvest::LateUpdates<Coasting, Fix, 8> late;
+  REQUIRE(plain.reset(x, P) == Status::kOk);
+  REQUIRE(late.reset(x, P) == Status::kOk);
+  const Vector<float, 2> z(2.5f, 0.7f);
+  for (int k = 0; k < 5; ++k) {
+    REQUIRE(plain.predict(0.75f) == Status::kOk);
+    REQUIRE(late.predict(0.75f) == Status::kOk);
+    if (k == 2) REQUIRE(plain.update(z, Fix()).status == Status::kOk);
+  }
+  REQUIRE(late.update(z, Fix(), 1.5f).status == Status::kOk);
+  CHECK(late.filter().x() == plain.x());
+  CHECK(late.filter().P() == plain.P());
+}
+
 TEST_CASE("late updates: with a full memory, one that is older than all that is kept") {
   Filter plain = slave();
   Late<4> late(slave());

@@ -19,7 +19,7 @@ inline namespace AUVEST_INSTRUCTIONS {
 template <class Filter, class Sensor>
 struct LateEvent {
   using Scalar = typename Filter::Scalar;
-  using Input = typename Filter::Process::Input;
+  using Input = typename InputOf<typename Filter::Process>::Type;
   using Measurement = typename Sensor::Measurement;
 
   bool is_update;
@@ -29,7 +29,7 @@ struct LateEvent {
   Sensor sensor;
 
   LateEvent() : is_update(false), dt(Scalar(0)) {
-    math::set_zero(input);
+    clear(input);
     math::set_zero(z);
   }
   LateEvent(Scalar step, const Input& u) : is_update(false), dt(step), input(u) {
@@ -37,12 +37,26 @@ struct LateEvent {
   }
   LateEvent(const Measurement& value, const Sensor& model)
       : is_update(true), dt(Scalar(0)), z(value), sensor(model) {
-    math::set_zero(input);
+    clear(input);
   }
 
   Status redo(Filter& filter) const {
-    return is_update ? filter.update(z, sensor).status : filter.predict(dt, input);
+    return is_update ? filter.update(z, sensor).status : step(filter, dt, input);
   }
+
+  /// A prediction, of whatever process.
+  template <class Given>
+  static Status step(Filter& filter, Scalar dt, const Given& input) {
+    return filter.predict(dt, input);
+  }
+  static Status step(Filter& filter, Scalar dt, const NoInput&) { return filter.predict(dt); }
+
+ private:
+  template <class Given>
+  static void clear(Given& input) {
+    math::set_zero(input);
+  }
+  static void clear(NoInput&) {}
 };
 
 /// The last `Capacity` events in order, in place.
@@ -123,7 +137,7 @@ class LateMemory {
 
   /// Carries the filter dt >= 0 seconds forward with this input.
   Status predict(Filter& filter, Scalar dt, const Input& input) {
-    const Status status = filter.predict(dt, input);
+    const Status status = Event::step(filter, dt, input);
     if (status == Status::kOk) insert(events_.size(), Event(dt, input));
     return status;
   }
@@ -211,6 +225,9 @@ class LateUpdates {
 
   /// Carries the filter dt >= 0 seconds forward with this input.
   Status predict(Scalar dt, const Input& input) { return memory_.predict(filter_, dt, input); }
+
+  /// The same for a process without input.
+  Status predict(Scalar dt) { return predict(dt, NoInput()); }
 
   /// Corrects by what was measured `age` >= 0 seconds ago. On anything but kOk nothing has changed.
   Report update(const Measurement& z, const Sensor& sensor, Scalar age = Scalar(0)) {

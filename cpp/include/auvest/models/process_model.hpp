@@ -107,7 +107,10 @@ struct ProcessModel {
   const Derived& derived() const { return static_cast<const Derived&>(*this); }
 };
 
-/// Whether a process has an input, and whether what is `Given` can be it.
+/// The input of a process that has none.
+struct NoInput {};
+
+/// Whether a process has an input, of which type, and whether what is `Given` can be it.
 template <class Process>
 class InputOf {
   static constexpr bool agree(int rows, int given) {
@@ -132,6 +135,11 @@ class InputOf {
   static constexpr bool declared(...) {
     return false;
   }
+  // Never defined.
+  template <class P>
+  static typename P::Input type(const typename P::Input*);
+  template <class P>
+  static NoInput type(...);
   template <class P, class Given>
   static constexpr bool takes(const typename P::Input*) {
     return alike<typename P::Input, Given>(nullptr, nullptr);
@@ -143,6 +151,7 @@ class InputOf {
 
  public:
   static constexpr bool kExists = declared<Process>(nullptr);
+  using Type = decltype(type<Process>(nullptr));
 
   template <class Given>
   static constexpr bool can_be() {
