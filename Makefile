@@ -169,7 +169,7 @@ test-cpp-matrix: $(MATRIX) ## the C++ tests under sanitizers: clang, C++20
 .PHONY: $(PAIRS) build-release
 $(PAIRS): matrix-%: setup-dev
 	cmake -S . -B build/$@ -G Ninja --log-level=WARNING -D AUVEST_BUILD_TESTS=ON \
-	    -D AUVEST_BUILD_BENCHMARKS=ON -D AUVEST_BUILD_TOOLS=ON \
+	    -D AUVEST_BUILD_BENCHMARKS=ON -D AUVEST_BUILD_TOOLS=ON -D AUVEST_SYNTAX_ONLY=ON \
 	    -D AUVEST_SANITIZE=ON -D CMAKE_BUILD_TYPE=Debug -D CMAKE_CXX_FLAGS_DEBUG=-g1 \
 	    -D CMAKE_CXX_COMPILER=$(if $(findstring clang,$@),clang++,g++) \
 	    -D CMAKE_CXX_STANDARD=$(lastword $(subst -, ,$@))

@@ -12,9 +12,9 @@ namespace auvest {
 namespace bindings {
 namespace {
 
-template <class Scalar, class Sink>
+template <class Scalar>
 MissionResult fly(const MissionScenario& s, int freedom, std::uint64_t seed, std::uint32_t run,
-                  Sink& sink) {
+                  const MissionSink& sink) {
   switch (freedom) {
     case 3:
       return fly_mission<Scalar, ThreeDof>(s, seed, run, sink);
@@ -86,7 +86,7 @@ py::dict fly_missions(const py::dict& values) {
     py::gil_scoped_release release;
     for (py::ssize_t run = 0; run < runs; ++run) {
       py::ssize_t row = 0;
-      auto sink = [&](const MissionStep& step) {
+      const MissionSink sink = [&](const MissionStep& step) {
         if (row >= rows) return;
         const auto put = [&](Column c, const double* from) {
           const py::ssize_t size = sizes[c];

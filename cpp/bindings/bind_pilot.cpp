@@ -59,7 +59,7 @@ class World {
     require_ok(world_.advance(command.data(), dt, time_s));
   }
 
-  const VehicleTruth& truth() const { return world_.hull.truth(); }
+  const VehicleTruth& truth() const { return world_.truth(); }
   std::array<double, 2> guess() const { return {world_.guess_m[0], world_.guess_m[1]}; }
   std::array<double, 2> current() const {
     return {world_.current.value[0], world_.current.value[1]};
@@ -76,13 +76,14 @@ class World {
     }
   };
 
-  mission_detail::MissionWorld<SixDof> world(std::uint64_t seed, std::uint32_t run) const {
-    return {scenario_, begin_.place, begin_.heading, seed, run};
+  mission_detail::MissionWorld world(std::uint64_t seed, std::uint32_t run) const {
+    return {scenario_, &mission_detail::launch_hull<SixDof>, begin_.place, begin_.heading, seed,
+            run};
   }
 
   MissionScenario scenario_;
   Begin begin_;
-  mission_detail::MissionWorld<SixDof> world_;
+  mission_detail::MissionWorld world_;
 };
 
 // ---- The pilot with the bits of the chip

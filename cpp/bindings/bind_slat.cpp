@@ -149,7 +149,7 @@ void bind_slat(py::module_& m) {
     result["turning"] = to_dict(CoordinatedTurn<double>::Params());
     return result;
   });
-  m.attr("slat_max_imm_masters") = kImmMasters;
+  m.attr("slat_max_imm_masters") = EkfMasters<ThreeModels<float>>::kMost;
   m.def("sonar_defaults", [] { return to_dict(Sonar<double>::Params()); });
   m.def("slatf_defaults", [] { return to_dict(SlatfParams<double>()); });
   m.def("slatf_joint_defaults", [] { return to_dict(SlatfJointParams<double>()); });

@@ -36,7 +36,6 @@ void add_function_filters(Catalogue<double>& catalogue) {
   add_filters<1>(catalogue);
   add_filters<5>(catalogue);
   add_filters<7>(catalogue);
-  add_filters<8>(catalogue);
   add_filters<9>(catalogue);
 }
 

@@ -53,17 +53,15 @@ class SlatBinder {
             "ekf_slat",
             [](const py::dict& motion_params, const py::dict& master, const py::dict& params) {
               const Motion slave = model<Motion>(motion_params);
-              return is_imm(master)
-                         ? ekf_slat<ImmEkf>(slave, imm(master), params)
-                         : ekf_slat<EkfSlatOf<Motion>>(slave, model<Master>(master), params);
+              const auto values = from_dict<EkfSlatParams<Scalar>>(params);
+              return Any(is_imm(master) ? make_ekf_slat(slave, imm(master), values)
+                                        : make_ekf_slat(slave, model<Master>(master), values));
             },
             py::arg("motion"), py::arg("master"), py::arg("params"))
         .def_static(
             "dead_reckoning",
             [](const py::dict& motion_params, Scalar longest_step_s) {
-              using Reckoning = DeadReckoning<Motion>;
-              return Any(new GaussianSlatModel<Reckoning>(
-                  Reckoning(model<Motion>(motion_params), longest_step_s)));
+              return Any(make_dead_reckoning(model<Motion>(motion_params), longest_step_s));
             },
             py::arg("motion"), py::arg("longest_step_s"))
         .def("copy", [](const Any& f) { return Any(f); })
@@ -307,9 +305,7 @@ class SlatBinder {
     }
   };
 
-  /// The hypotheses of the joint filter grow with the power of the masters.
   using Models = ThreeModels<Scalar>;
-  using ImmEkf = EkfSlat<Motion, Models, kImmMasters>;
 
   static bool is_imm(const py::dict& master) { return master.contains("switch_rate_hz"); }
 
@@ -325,13 +321,6 @@ class SlatBinder {
         model<CoordinatedTurn<Scalar>>(master["turning"].template cast<py::dict>()));
     require_ok(result.check());
     return result;
-  }
-
-  template <class Ekf>
-  static Any ekf_slat(const Motion& motion, const typename Ekf::Master& master,
-                      const py::dict& values) {
-    return Any(
-        new GaussianSlatModel<Ekf>(Ekf(motion, master, from_dict<EkfSlatParams<Scalar>>(values))));
   }
 
   static Any slatf(const py::dict& motion, const py::dict& master, const py::dict& params,

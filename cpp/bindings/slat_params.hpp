@@ -43,10 +43,6 @@ AUVEST_VISIT(Sonar, v("sigma_range_m", p.sigma_range_m);
 
 #undef AUVEST_VISIT
 
-template <class Motion>
-using EkfSlatOf = EkfSlat<Motion, PiecewiseAcceleration<typename Motion::Scalar>,
-                          AnySlat<typename Motion::Scalar, Motion::kStates>::kMasters>;
-
 template <class Scalar, class Visitor>
 void visit(EchoParams<Scalar>& p, Visitor v) {
   v("gate", p.gate);

@@ -4,23 +4,17 @@
 namespace auvest {
 inline namespace AUVEST_INSTRUCTIONS {
 
-constexpr auto kSet = bindings::InstructionSet::kScalar;
-
-template <class Scalar>
-struct LanesOf<kSet, Scalar> {
-  using Type = OneLane<Scalar>;
-};
-
 template <class Motion>
-using Setup = SlatfSetup<Motion, ThreeModels<typename Motion::Scalar>>;
+using ImmSetup = SlatfSetup<Motion, ThreeModels<typename Motion::Scalar>>;
 
-template SlatfInterface<CompassMotion<float>>* make_slatf<kSet>(const Setup<CompassMotion<float>>&);
-template SlatfInterface<UnicycleMotion<float>>* make_slatf<kSet>(
-    const Setup<UnicycleMotion<float>>&);
-template SlatfInterface<CompassMotion<double>>* make_slatf<kSet>(
-    const Setup<CompassMotion<double>>&);
-template SlatfInterface<UnicycleMotion<double>>* make_slatf<kSet>(
-    const Setup<UnicycleMotion<double>>&);
+template SlatfInterface<CompassMotion<float>>* make_slatf<bindings::InstructionSet::kScalar>(
+    const ImmSetup<CompassMotion<float>>&);
+template SlatfInterface<UnicycleMotion<float>>* make_slatf<bindings::InstructionSet::kScalar>(
+    const ImmSetup<UnicycleMotion<float>>&);
+template SlatfInterface<CompassMotion<double>>* make_slatf<bindings::InstructionSet::kScalar>(
+    const ImmSetup<CompassMotion<double>>&);
+template SlatfInterface<UnicycleMotion<double>>* make_slatf<bindings::InstructionSet::kScalar>(
+    const ImmSetup<UnicycleMotion<double>>&);
 
 }  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

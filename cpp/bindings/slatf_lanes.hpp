@@ -9,6 +9,10 @@ inline namespace AUVEST_INSTRUCTIONS {
 
 template <bindings::InstructionSet set, class Scalar>
 struct LanesOf;  // ::Type
+template <class Scalar>
+struct LanesOf<bindings::InstructionSet::kScalar, Scalar> {
+  using Type = OneLane<Scalar>;
+};
 
 template <class Lanes, class Setup>
 SlatfInterface<typename Setup::Motion>* slatf_in(const Setup& setup) {

@@ -4,23 +4,14 @@
 namespace auvest {
 inline namespace AUVEST_INSTRUCTIONS {
 
-constexpr auto kSet = bindings::InstructionSet::kScalar;
-
-template <class Scalar>
-struct LanesOf<kSet, Scalar> {
-  using Type = OneLane<Scalar>;
-};
-
-template <class Motion>
-using Setup = SlatfSetup<Motion>;
-
-template SlatfInterface<CompassMotion<float>>* make_slatf<kSet>(const Setup<CompassMotion<float>>&);
-template SlatfInterface<UnicycleMotion<float>>* make_slatf<kSet>(
-    const Setup<UnicycleMotion<float>>&);
-template SlatfInterface<CompassMotion<double>>* make_slatf<kSet>(
-    const Setup<CompassMotion<double>>&);
-template SlatfInterface<UnicycleMotion<double>>* make_slatf<kSet>(
-    const Setup<UnicycleMotion<double>>&);
+template SlatfInterface<CompassMotion<float>>* make_slatf<bindings::InstructionSet::kScalar>(
+    const SlatfSetup<CompassMotion<float>>&);
+template SlatfInterface<UnicycleMotion<float>>* make_slatf<bindings::InstructionSet::kScalar>(
+    const SlatfSetup<UnicycleMotion<float>>&);
+template SlatfInterface<CompassMotion<double>>* make_slatf<bindings::InstructionSet::kScalar>(
+    const SlatfSetup<CompassMotion<double>>&);
+template SlatfInterface<UnicycleMotion<double>>* make_slatf<bindings::InstructionSet::kScalar>(
+    const SlatfSetup<UnicycleMotion<double>>&);
 
 }  // namespace AUVEST_INSTRUCTIONS
 }  // namespace auvest

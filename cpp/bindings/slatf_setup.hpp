@@ -1,4 +1,4 @@
-// What a SLATF or a SlatfJoint is made of at run time, and the instruction sets in whose lanes it
+// What a filter of slat/ is made of at run time, and the instruction sets in whose lanes a SLATF
 // can run.
 #pragma once
 
@@ -23,13 +23,20 @@
 namespace auvest {
 inline namespace AUVEST_INSTRUCTIONS {
 
-/// Masters that EkfSlat with an Imm takes here: 3 to their power hypotheses.
-constexpr int kImmMasters = 2;
-
 /// The models of a master whose manoeuvres nobody announces.
 template <class Scalar>
 using ThreeModels =
     Imm<ConstantVelocity<Scalar>, ExactAcceleration<Scalar>, CoordinatedTurn<Scalar>>;
+
+/// Masters that an EkfSlat takes here. With an Imm there are 3 to their power hypotheses.
+template <class Master>
+struct EkfMasters {
+  static constexpr int kMost = bindings::kMostMasters;
+};
+template <class Scalar>
+struct EkfMasters<ThreeModels<Scalar>> {
+  static constexpr int kMost = 2;
+};
 
 template <class Motion_, class Master_ = PiecewiseAcceleration<typename Motion_::Scalar>>
 struct SlatfSetup {
@@ -74,6 +81,14 @@ SlatfInterface<Motion>* make_slatf(const SlatfSetup<Motion, Master>& setup);
 /// Defined and compiled in slatf_joint.cpp.
 template <class Motion>
 SlatfInterface<Motion>* make_slatf_joint(const SlatfJointSetup<Motion>& setup);
+
+/// Defined and compiled in ekf_slat.cpp.
+template <class Motion, class Master>
+SlatfInterface<Motion>* make_ekf_slat(const Motion& motion, const Master& master,
+                                      const EkfSlatParams<typename Motion::Scalar>& params);
+template <class Motion>
+SlatfInterface<Motion>* make_dead_reckoning(const Motion& motion,
+                                            typename Motion::Scalar longest_step_s);
 
 /// Defined and compiled in slatf_shared.cpp.
 template <class Motion>

@@ -1,11 +1,11 @@
 // The models of the registry whose state has 2 numbers, compiled.
-#include "auvest/registry.hpp"
-#include "desk/catalogue.hpp"
+#include "desk/states.hpp"
 
 namespace auvest {
 namespace desk {
 
-AUVEST_DEFINE_MODELS(2)
+template void add_models<2, float>(Catalogue<float>&);
+template void add_models<2, double>(Catalogue<double>&);
 
 }  // namespace desk
 }  // namespace auvest

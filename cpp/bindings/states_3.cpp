@@ -1,11 +1,11 @@
 // The models of the registry whose state has 3 numbers, compiled.
-#include "auvest/registry.hpp"
-#include "desk/catalogue.hpp"
+#include "desk/states.hpp"
 
 namespace auvest {
 namespace desk {
 
-AUVEST_DEFINE_MODELS(3)
+template void add_models<3, float>(Catalogue<float>&);
+template void add_models<3, double>(Catalogue<double>&);
 
 }  // namespace desk
 }  // namespace auvest

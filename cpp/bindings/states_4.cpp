@@ -1,11 +1,11 @@
 // The models of the registry whose state has 4 numbers, compiled.
-#include "auvest/registry.hpp"
-#include "desk/catalogue.hpp"
+#include "desk/states.hpp"
 
 namespace auvest {
 namespace desk {
 
-AUVEST_DEFINE_MODELS(4)
+template void add_models<4, float>(Catalogue<float>&);
+template void add_models<4, double>(Catalogue<double>&);
 
 }  // namespace desk
 }  // namespace auvest

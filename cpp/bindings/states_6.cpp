@@ -1,11 +1,11 @@
 // The models of the registry whose state has 6 numbers, compiled.
-#include "auvest/registry.hpp"
-#include "desk/catalogue.hpp"
+#include "desk/states.hpp"
 
 namespace auvest {
 namespace desk {
 
-AUVEST_DEFINE_MODELS(6)
+template void add_models<6, float>(Catalogue<float>&);
+template void add_models<6, double>(Catalogue<double>&);
 
 }  // namespace desk
 }  // namespace auvest

@@ -1,11 +1,11 @@
 // The models of the registry whose state has 8 numbers, compiled.
-#include "auvest/registry.hpp"
-#include "desk/catalogue.hpp"
+#include "desk/states.hpp"
 
 namespace auvest {
 namespace desk {
 
-AUVEST_DEFINE_MODELS(8)
+template void add_models<8, float>(Catalogue<float>&);
+template void add_models<8, double>(Catalogue<double>&);
 
 }  // namespace desk
 }  // namespace auvest

@@ -100,25 +100,9 @@ void add_filters(Catalogue<Scalar>& catalogue) {
   catalogue.filters[N] = &make_filter<Scalar, N>;
 }
 
-/// The filters and the models of the registry for N states: states_<N>.cpp.
+/// The filters and the models of the registry for N states: states_<N>.cpp, by desk/states.hpp.
 template <int N, class Scalar>
 void add_models(Catalogue<Scalar>& catalogue);
-
-#define AUVEST_ADD_PROCESS(name, ...) \
-  if constexpr (__VA_ARGS__::kStates == N) add_process<__VA_ARGS__>(catalogue, name);
-#define AUVEST_ADD_SENSOR(name, suits, ...) \
-  if constexpr (suits) add_sensor<__VA_ARGS__>(catalogue, name);
-
-/// Defines add_models for n states in both precisions. Needs auvest/registry.hpp.
-#define AUVEST_DEFINE_MODELS(n)                          \
-  template <int N, class Scalar>                         \
-  void add_models(Catalogue<Scalar>& catalogue) {        \
-    add_filters<N>(catalogue);                           \
-    AUVEST_PROCESSES(AUVEST_ADD_PROCESS)                 \
-    AUVEST_SENSORS(AUVEST_ADD_SENSOR)                    \
-  }                                                      \
-  template void add_models<n, float>(Catalogue<float>&); \
-  template void add_models<n, double>(Catalogue<double>&);
 
 }  // namespace desk
 }  // namespace auvest

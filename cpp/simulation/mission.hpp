@@ -10,7 +10,9 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <limits>
+#include <memory>
 
 #include "auvest/control/autopilot.hpp"
 #include "auvest/control/heading_filter.hpp"
@@ -75,16 +77,33 @@ struct MissionStep {
   const MissionReadings& readings;
 };
 
+/// Who looks at every step; it may be empty.
+using MissionSink = std::function<void(const MissionStep&)>;
+
 namespace mission_detail {
 
-/// A hull in these degrees of freedom, as the sensors see it. What is not free stays where it was.
-template <class Freedom>
+/// A hull as the sensors see it. The loop does not know its degrees of freedom: it is long, and
+/// would be compiled for each.
 class MissionHull {
+ public:
+  virtual ~MissionHull() = default;
+
+  const VehicleTruth& truth() const { return truth_; }
+  virtual void set_current(const double* stream) = 0;
+  virtual Status advance(const double* command, double dt, double time_s) = 0;
+
+ protected:
+  VehicleTruth truth_;
+};
+
+/// In these degrees of freedom. What is not free stays where it was.
+template <class Freedom>
+class MissionHullIn final : public MissionHull {
  public:
   using Body = Hull<Torpedo<double>, Freedom>;
 
-  MissionHull(const double* position, double depth, double heading, double speed,
-              const double* stream)
+  MissionHullIn(const double* position, double depth, double heading, double speed,
+                const double* stream)
       : body_(remus100<double>()) {
     math::set_zero(state_);
     current_(0) = stream[0];
@@ -104,14 +123,12 @@ class MissionHull {
     read();
   }
 
-  const VehicleTruth& truth() const { return truth_; }
-
-  void set_current(const double* stream) {
+  void set_current(const double* stream) override {
     current_(0) = stream[0];
     current_(1) = stream[1];
   }
 
-  Status advance(const double* command, double dt, double time_s) {
+  Status advance(const double* command, double dt, double time_s) override {
     typename Body::Command c;
     for (int i = 0; i < 3; ++i) c(i) = command[i];
     const Status status = auvest::advance<Rk4>(body_, state_, c, current_, dt);
@@ -138,8 +155,19 @@ class MissionHull {
   Body body_;
   typename Body::State state_;
   typename Body::Current current_;
-  VehicleTruth truth_;
 };
+
+/// Makes a hull at a place [m], a depth [m], a heading [rad] and a speed [m/s], in a current [m/s].
+using MissionLaunch = std::unique_ptr<MissionHull> (*)(const double* position, double depth,
+                                                       double heading, double speed,
+                                                       const double* stream);
+
+template <class Freedom>
+std::unique_ptr<MissionHull> launch_hull(const double* position, double depth, double heading,
+                                         double speed, const double* stream) {
+  return std::unique_ptr<MissionHull>(
+      new MissionHullIn<Freedom>(position, depth, heading, speed, stream));
+}
 
 /// Sum of squares and their number.
 struct SquareMean {
@@ -184,7 +212,6 @@ class MissionCurrent {
 
 /// What a run meets: the current, the hull, its sensors, and how wrong the first estimate is. All
 /// is drawn from the run's own streams.
-template <class Freedom>
 class MissionWorld {
   struct Draw {
     double towards_rad;
@@ -202,47 +229,51 @@ class MissionWorld {
     return timing;
   }
 
-  MissionWorld(const MissionScenario& s, const double* start, double heading, std::uint64_t seed,
-               std::uint32_t run, const Draw& draw)
+  MissionWorld(const MissionScenario& s, MissionLaunch launch, const double* start, double heading,
+               std::uint64_t seed, std::uint32_t run, const Draw& draw)
       : current(s, draw.towards_rad, math::Random(seed, stream(run) + 6)),
         guess_m{start[0] + s.initial_error_m * draw.error[0],
                 start[1] + s.initial_error_m * draw.error[1]},
-        hull(start, s.depth_m, heading, s.speed_m_s, current.value),
         compass(s.compass, each(s), math::Random(seed, stream(run) + 1)),
         gyro(s.gyro, each(s), math::Random(seed, stream(run) + 2)),
         depth(s.depth, each(s), math::Random(seed, stream(run) + 3)),
         log(s.log, each(s), math::Random(seed, stream(run) + 4)),
-        usbl(s.usbl, s.usbl_timing, math::Random(seed, stream(run) + 5)) {}
+        usbl(s.usbl, s.usbl_timing, math::Random(seed, stream(run) + 5)),
+        hull_(launch(start, s.depth_m, heading, s.speed_m_s, current.value)) {}
 
  public:
   /// At this place [m] and heading [rad], at the scenario's speed.
-  MissionWorld(const MissionScenario& s, const double* start, double heading, std::uint64_t seed,
-               std::uint32_t run)
-      : MissionWorld(s, start, heading, seed, run, Draw(math::Random(seed, stream(run)))) {}
+  MissionWorld(const MissionScenario& s, MissionLaunch launch, const double* start, double heading,
+               std::uint64_t seed, std::uint32_t run)
+      : MissionWorld(s, launch, start, heading, seed, run, Draw(math::Random(seed, stream(run)))) {}
+
+  const VehicleTruth& truth() const { return hull_->truth(); }
 
   /// All sensors but USBL, which reads when it is asked, read if their clocks say so.
   void sample() {
-    compass.sample(hull.truth());
-    gyro.sample(hull.truth());
-    depth.sample(hull.truth());
-    log.sample(hull.truth());
+    compass.sample(truth());
+    gyro.sample(truth());
+    depth.sample(truth());
+    log.sample(truth());
   }
 
   /// The command is held for dt seconds, until time_s.
   Status advance(const double* command, double dt, double time_s) {
     current.advance();
-    hull.set_current(current.value);
-    return hull.advance(command, dt, time_s);
+    hull_->set_current(current.value);
+    return hull_->advance(command, dt, time_s);
   }
 
   MissionCurrent current;
   const double guess_m[2];  ///< the first estimate of the place
-  MissionHull<Freedom> hull;
   VehicleSensor<CompassDevice> compass;
   VehicleSensor<GyroDevice> gyro;
   VehicleSensor<DepthDevice> depth;
   VehicleSensor<LogDevice> log;
   VehicleSensor<UsblDevice> usbl;
+
+ private:
+  std::unique_ptr<MissionHull> hull_;
 };
 
 /// What the vehicle makes of its sensors: the readings of its controllers, and what drives the
@@ -269,9 +300,8 @@ class MissionSensors {
   }
 
   /// What the sensors of the world say of it, dt seconds after the last time.
-  template <class World>
-  void read(World& world, Scalar dt) {
-    const VehicleTruth& truth = world.hull.truth();
+  void read(MissionWorld& world, Scalar dt) {
+    const VehicleTruth& truth = world.truth();
     told = MissionReadings();
     told.pitch_rad = truth.pose[4];
     world.sample();
@@ -339,15 +369,15 @@ class MissionTally {
   double travel_ = 0;
 };
 
-template <class Scalar, class Freedom, class Navigator, class Sink>
-MissionResult fly_with(const MissionScenario& s, std::uint64_t seed, std::uint32_t run,
-                       Sink& sink) {
+template <class Scalar, class Navigator>
+MissionResult fly_with(const MissionScenario& s, MissionLaunch launch, std::uint64_t seed,
+                       std::uint32_t run, const MissionSink& sink) {
   MissionResult result;
   MissionPath<Scalar> path(s);
   double start[2];
   double heading = 0;
   path.start(start, heading);
-  MissionWorld<Freedom> world(s, start, heading, seed, run);
+  MissionWorld world(s, launch, start, heading, seed, run);
   const double* const current = world.current.value;
   MissionSensors<Scalar> sensors;
   const bool exact = s.estimate == MissionEstimate::kTruth;
@@ -375,7 +405,7 @@ MissionResult fly_with(const MissionScenario& s, std::uint64_t seed, std::uint32
   MissionTally tally;
   std::uint32_t k = 0;
   for (;; ++k) {
-    const VehicleTruth& truth = world.hull.truth();
+    const VehicleTruth& truth = world.truth();
     const double most = s.track == MissionTrack::kCircle ? s.circle_s : s.most_s;
     if (truth.time_s >= most - 1e-9) break;
 
@@ -468,7 +498,7 @@ MissionResult fly_with(const MissionScenario& s, std::uint64_t seed, std::uint32
         0,
         sensors.told};
     navigator.judge(truth, current, step.nees_position, step.nees);
-    sink(static_cast<const MissionStep&>(step));
+    if (sink) sink(step);
 
     result.status = world.advance(command, s.period_s, (k + 1) * s.period_s);
     if (result.status != Status::kOk) return result;
@@ -483,28 +513,23 @@ MissionResult fly_with(const MissionScenario& s, std::uint64_t seed, std::uint32
 /// Flies run number `run` of a scenario in these degrees of freedom and hands every step to
 /// `sink(step)`. The same seed and run give the same current, compass, noise and initial error
 /// whatever the scenario. The result's status is kOk, or the first that is not: the run ends there.
-template <class Scalar, class Freedom = SixDof, class Sink>
+template <class Scalar, class Freedom = SixDof>
 MissionResult fly_mission(const MissionScenario& scenario, std::uint64_t seed, std::uint32_t run,
-                          Sink&& sink) {
+                          const MissionSink& sink = nullptr) {
+  const mission_detail::MissionLaunch launch = &mission_detail::launch_hull<Freedom>;
   switch (scenario.estimate) {
     case MissionEstimate::kUkf:
-      return mission_detail::fly_with<Scalar, Freedom, mission_detail::UkfNavigator<Scalar>>(
-          scenario, seed, run, sink);
+      return mission_detail::fly_with<Scalar, mission_detail::UkfNavigator<Scalar>>(
+          scenario, launch, seed, run, sink);
     case MissionEstimate::kModelAided:
-      return mission_detail::fly_with<Scalar, Freedom, mission_detail::ModelAidedNavigator<Scalar>>(
-          scenario, seed, run, sink);
+      return mission_detail::fly_with<Scalar, mission_detail::ModelAidedNavigator<Scalar>>(
+          scenario, launch, seed, run, sink);
     case MissionEstimate::kTruth:
     case MissionEstimate::kFixes:
       break;
   }
-  return mission_detail::fly_with<Scalar, Freedom, mission_detail::FixNavigator<Scalar>>(
-      scenario, seed, run, sink);
-}
-
-/// The same without a look at the steps.
-template <class Scalar, class Freedom = SixDof>
-MissionResult fly_mission(const MissionScenario& scenario, std::uint64_t seed, std::uint32_t run) {
-  return fly_mission<Scalar, Freedom>(scenario, seed, run, [](const MissionStep&) {});
+  return mission_detail::fly_with<Scalar, mission_detail::FixNavigator<Scalar>>(scenario, launch,
+                                                                                seed, run, sink);
 }
 
 }  // namespace auvest
