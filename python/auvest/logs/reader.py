@@ -24,6 +24,8 @@ Rows = npt.NDArray[np.float64]
 
 #: Lines read at once: a few megabytes, and long enough that the cost of a chunk does not count.
 CHUNK_LINES = 32768
+#: Of fewer lines numbers are read without pyarrow, which takes longer to import.
+FEW_LINES = 1000
 #: What a name ends with that is in another unit than the layout's.
 _OTHER_UNITS = frozenset(
     (
@@ -190,11 +192,11 @@ class CsvTable:
         for lines, line in self._lines():
             yield self._converted(self._parse(lines, line)), line
 
-    def _lines(self) -> Iterator[tuple[list[str], int]]:
+    def _lines(self) -> Iterator[tuple[list[bytes], int]]:
         line = 2
-        blank: list[str] = []  # such lines at the end of the file are none, others are errors
+        blank: list[bytes] = []  # such lines at the end of the file are none, others are errors
         try:
-            with self.path.open(encoding="utf-8-sig", newline="\n") as file:
+            with self.path.open("rb") as file:
                 self.bytes_read = len(file.readline())
                 while chunk := list(islice(file, CHUNK_LINES)):
                     self.bytes_read += sum(map(len, chunk))
@@ -204,8 +206,6 @@ class CsvTable:
                         line += len(lines)
         except OSError as error:
             raise LogError(self.path, f"cannot be read: {error.strerror or error}") from None
-        except UnicodeDecodeError:
-            raise LogError(self.path, f"is not UTF-8 text after line {line - 1}") from None
 
     def whole(self) -> Rows:
         """All rows of a small file.
@@ -321,19 +321,56 @@ class CsvTable:
     def _mapped(self) -> set[str]:
         return {said.removeprefix("-") for said in self._reading.columns.values()}
 
-    def _parse(self, lines: list[str], first: int) -> Rows:
-        if not lines[-1].endswith("\n"):
+    def _parse(self, lines: list[bytes], first: int) -> Rows:
+        if not lines[-1].endswith(b"\n"):
             raise LogError(
                 self.path, "does not end with a line end: truncated", line=first + len(lines) - 1
             )
-        rows = self._loaded(lines)
+        rows = self._numbers(lines)
         if rows is None:
-            rows = np.array([self._parse_line(text, first + i) for i, text in enumerate(lines)])
+            try:
+                text = [line.decode() for line in lines]
+            except UnicodeDecodeError:
+                raise LogError(self.path, f"is not UTF-8 text after line {first - 1}") from None
+            rows = self._loaded(text)
+            if rows is None:
+                rows = np.array([self._parse_line(one, first + i) for i, one in enumerate(text)])
         for k, factor in enumerate(self._factors):
             if factor != 1.0:
                 rows[:, k] *= factor
         self._check(rows, first)
         return rows
+
+    def _numbers(self, lines: list[bytes]) -> Rows | None:
+        """Read lines of plain numbers fast; None if there is anything else among them."""
+        said = self._reading
+        if said.decimal != "." or said.separator == " " or "time" in self._given:
+            return None
+        text = b"".join(lines)
+        if len(lines) < FEW_LINES or not text.isascii():
+            return None
+        from pyarrow import ArrowInvalid, BufferReader, csv, float64  # here: slow to import
+
+        names = [str(k) for k in range(len(self._header))]
+        used = [names[k] for k in self._used]
+        with suppress(ArrowInvalid):  # the other ways to read say what is wrong, and where
+            table = csv.read_csv(
+                BufferReader(text),
+                csv.ReadOptions(use_threads=False, column_names=names, block_size=len(text)),
+                csv.ParseOptions(
+                    delimiter=said.separator, quote_char=False, ignore_empty_lines=False
+                ),
+                csv.ConvertOptions(
+                    include_columns=used, column_types=dict.fromkeys(used, float64()),
+                    null_values=[],
+                ),
+            )  # fmt: skip
+            if len(table) == len(lines):  # a carriage return ends a line there, and none here
+                # Not to_numpy, which imports pandas.
+                (batch,) = table.to_batches()
+                columns = (one.buffers()[1] for one in batch.columns)
+                return np.column_stack([np.frombuffer(one, np.float64) for one in columns])
+        return None
 
     def _loaded(self, lines: list[str]) -> Rows | None:
         """Read lines at once; None if one of them is not what it should be."""
@@ -421,7 +458,7 @@ class CsvTable:
             )
 
 
-def _without_blank_end(lines: list[str]) -> tuple[list[str], list[str]]:
+def _without_blank_end(lines: list[bytes]) -> tuple[list[bytes], list[bytes]]:
     """Part lines where nothing but blank ones follow."""
     end = len(lines)
     while end and not lines[end - 1].strip():

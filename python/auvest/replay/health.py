@@ -234,11 +234,11 @@ def _expected(rows: Columns) -> tuple[float, float]:
 
 def truncated_moments(numbers: int, limit: float) -> tuple[float, float]:
     """Mean and standard deviation of a chi-square value of one or two numbers below a limit."""
-    from scipy import stats  # here, because it is slow to import
+    from scipy.special import chdtr  # here, because it is slow to import
 
-    inside = stats.chi2.cdf(limit, numbers)
-    mean = numbers * stats.chi2.cdf(limit, numbers + 2) / inside
-    square = numbers * (numbers + 2) * stats.chi2.cdf(limit, numbers + 4) / inside
+    inside = chdtr(numbers, limit)
+    mean = numbers * chdtr(numbers + 2, limit) / inside
+    square = numbers * (numbers + 2) * chdtr(numbers + 4, limit) / inside
     return float(mean), math.sqrt(float(square - mean * mean))
 
 
