@@ -30,7 +30,7 @@ from auvest.replay.tables import Columns
 #: So many lines of each file are looked at: a diagnosis of a day takes no longer than of an hour.
 LINES = 100_000
 #: So many measurements tell all causes apart that any number does.
-MEASUREMENTS = 20_000
+MEASUREMENTS = 10_000
 #: Share of outliers that the likelihood allows for, and over how many metres they are spread.
 OUTLIERS, OUTLIER_REACH_M = 0.05, 100.0
 #: A cause must make the innovations so much likelier: in all, and per measurement (nats).

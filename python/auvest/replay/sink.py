@@ -57,6 +57,15 @@ class _Sink:
             writer.close()
 
 
+def _parquet(file: BinaryIO, schema: pa.Schema) -> Any:
+    """Look for repeated values among words alone: among numbers that takes half of the time."""
+    words = [one.name for one in schema if pa.types.is_string(one.type)]
+    return pa_parquet.ParquetWriter(file, schema, use_dictionary=words)
+
+
+_WRITERS: dict[str, Any] = {"csv": pa_csv.CSVWriter, "parquet": _parquet}
+
+
 class TableFiles(_Sink):
     """``<stem>.parquet`` or ``<stem>.csv`` in a folder, or both, written a batch at a time.
 
@@ -80,9 +89,8 @@ class TableFiles(_Sink):
         """Append rows; the first batch fixes names and types."""
         table = _table(columns)
         if not self._writers:
-            kinds = {"csv": pa_csv.CSVWriter, "parquet": pa_parquet.ParquetWriter}
             self._writers = [
-                kinds[one](self._open(path), table.schema) for one, path in self.paths.items()
+                _WRITERS[one](self._open(path), table.schema) for one, path in self.paths.items()
             ]
         for writer in self._writers if len(table) else ():
             writer.write_table(table)
