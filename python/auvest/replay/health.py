@@ -165,14 +165,15 @@ class Residuals:
         self.recoveries += int(measured["recovered"].sum())
         rows = {**measured, "range_m": batch.ranges_m}
         self._samples.add(rows)
-        echoes = measured["sensor"] == "echo"
-        self.refused += int((echoes & (measured["outcome"] == tables.REJECTED)).sum())
-        self.judged += int((echoes & ~np.isin(measured["outcome"], tables.UNUSED)).sum())
-        self.sensors.update(measured["sensor"].tolist())
+        self.sensors.update(tables.counts(measured["sensor"]))
+        became = tables.counts(measured["outcome"])
+        if batch.masters is not None:
+            self.refused += became.get(tables.REJECTED, 0)
+            self.judged += sum(n for name, n in became.items() if name not in tables.UNUSED)
         for source in np.unique(measured["source"]).tolist():
             mine = measured["source"] == source
             self.lines[int(source)] += int(mine.sum())
-            for outcome in tables.UNUSED:
+            for outcome in (name for name in tables.UNUSED if name in became):
                 self.unused[int(source), outcome] += int(
                     (measured["outcome"][mine] == outcome).sum()
                 )
