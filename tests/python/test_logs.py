@@ -142,6 +142,49 @@ def test_an_error_names_its_cause(tmp_path: Path, text: str, cause: str) -> None
     assert caught.value.cause == cause
 
 
+#: Lines that are no "k,0,5.5", and how a slow reader takes them; all else is refused.
+_ODD = (
+    "7,0", "7,0,", "7,,5", "7,0,5,", "7,0,5,6", "7,0,1_0", "7,0,0x10", "7,0,5d0", '7,0,"5"',
+    "7,0,1e999",
+    "7,0,nan", "7,0,nan(a)", "7,0,inf", "7,0,NULL", "7,0,true", "7,0, ", "7,0,5\r", "7,0,5\r7,0,5",
+    "7,0,\r5", "7,0,5\x00", "7,0,\u0665", "7,0,5\xa0", "", " ", "7;0;5", "7,0,5#", "7.5,0.5,5",
+    "7,0,-5",
+    " 7 ,0,\t5", "+7,0,+5.", "7,0,.5e1", "7,0,1e-400", "007,0,0005",
+    "7,0,4.9406564584124654e-324", "7,0,0.1000000000000000055511151231257827021181583404541015625",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("odd", _ODD, ids=ascii)
+def test_fast_reading_takes_and_refuses_what_slow_reading_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, odd: str
+) -> None:
+    lines = [f"{k},{k % 3},5.{k}" for k in range(40)]
+    lines[17] = odd
+    path = write(tmp_path, "ranges.csv", HEAD + "\n".join(lines) + "\n")
+
+    def found(few: int) -> bytes | tuple[str, str]:
+        monkeypatch.setattr(reader, "FEW_LINES", few)
+        try:
+            return read(path).tobytes()
+        except LogError as error:
+            return str(error), error.cause
+
+    fast = found(1)
+    assert fast == found(1000)
+    if isinstance(fast, tuple):
+        assert "line 19" in fast[0] or "after line 1" in fast[0]
+
+
+def test_numbers_are_read_to_the_bit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As Python writes and reads them."""
+    monkeypatch.setattr(reader, "FEW_LINES", 1)
+    rng = np.random.default_rng(1)
+    numbers = 10.0 ** rng.uniform(-300, 4.9, 4000) * rng.uniform(0.1, 1, 4000)
+    rows = [f"{k},0,{number!r}" for k, number in enumerate(numbers.tolist())]
+    path = write(tmp_path, "ranges.csv", HEAD + "\n".join(rows) + "\n")
+    np.testing.assert_array_equal(read(path)[:, 2], numbers)
+
+
 def test_line_numbers_are_those_of_the_file_in_later_chunks_too(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -187,7 +187,7 @@ def mrclam6_tracks(source: Path) -> dict[str, Log]:
     A track has at least 15 s of sightings without a gap above 6 s, while the truth of both is
     known; it starts at the slave's true pose, with the first of them.
     """
-    return _tracks(source, robots_of_mrclam6(source))
+    return _tracks(source / "sightings.csv", robots_of_mrclam6(source))
 
 
 @_importer
@@ -202,7 +202,7 @@ def mrclam(source: Path) -> dict[str, Log]:
 @_importer
 def mrclam_tracks(source: Path) -> dict[str, Log]:
     """Read these text files as :func:`mrclam6_tracks` does."""
-    return _tracks(source, _robots_of_mrclam(source))
+    return _tracks(source / "Robot1_Measurement.dat", _robots_of_mrclam(source))
 
 
 @_importer
@@ -344,8 +344,8 @@ def _slaves(robots: Robots) -> dict[str, Log]:
     return logs
 
 
-def _tracks(source: Path, robots: Robots) -> dict[str, Log]:
-    """Make a log of each track."""
+def _tracks(path: Path, robots: Robots) -> dict[str, Log]:
+    """Make a log of each track; ``path`` is named where there is none."""
     logs: dict[str, Log] = {}
     for slave, master, echoes in robots.tracks():
         begin, end = float(echoes[0, 0]), float(echoes[-1, 0])
@@ -362,7 +362,7 @@ def _tracks(source: Path, robots: Robots) -> dict[str, Log]:
             "master_truth.csv": _of_source(of_master, master),
         }
     if not logs:
-        raise LogError(source, "no robot sees another for long enough")
+        raise LogError(path, "no robot sees another for long enough while both have a truth")
     return logs
 
 

@@ -9,7 +9,6 @@ import csv
 import math
 from collections.abc import Iterator
 from contextlib import suppress
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +23,9 @@ Rows = npt.NDArray[np.float64]
 
 #: Lines read at once: a few megabytes, and long enough that the cost of a chunk does not count.
 CHUNK_LINES = 32768
+_LINE_BYTES = 64  # or less
+#: Of fewer lines numbers are read without pyarrow, which takes longer to import.
+FEW_LINES = 1000
 #: What a name ends with that is in another unit than the layout's.
 _OTHER_UNITS = frozenset(
     (
@@ -187,25 +189,25 @@ class CsvTable:
         LogError
             At the first line that is not what the layout says.
         """
-        for lines, line in self._lines():
-            yield self._converted(self._parse(lines, line)), line
+        for text, line in self._texts():
+            yield self._converted(self._parse(text, line)), line
 
-    def _lines(self) -> Iterator[tuple[list[str], int]]:
+    def _texts(self) -> Iterator[tuple[bytes, int]]:
+        """Give whole lines, about :data:`CHUNK_LINES` at once, and the number of the first."""
         line = 2
-        blank: list[str] = []  # such lines at the end of the file are none, others are errors
+        blank = b""  # such lines at the end of the file are none, others are errors
         try:
-            with self.path.open(encoding="utf-8-sig", newline="\n") as file:
+            with self.path.open("rb") as file:
                 self.bytes_read = len(file.readline())
-                while chunk := list(islice(file, CHUNK_LINES)):
-                    self.bytes_read += sum(map(len, chunk))
-                    lines, blank = _without_blank_end(blank + chunk)
-                    if lines:
-                        yield lines, line
-                        line += len(lines)
+                while chunk := file.read(CHUNK_LINES * _LINE_BYTES):
+                    chunk += file.readline()
+                    self.bytes_read += len(chunk)
+                    text, blank = _without_blank_end(blank + chunk)
+                    if text:
+                        yield text, line
+                        line += text.count(b"\n")
         except OSError as error:
             raise LogError(self.path, f"cannot be read: {error.strerror or error}") from None
-        except UnicodeDecodeError:
-            raise LogError(self.path, f"is not UTF-8 text after line {line - 1}") from None
 
     def whole(self) -> Rows:
         """All rows of a small file.
@@ -239,8 +241,9 @@ class CsvTable:
     def first_place(self) -> tuple[float, float] | None:
         """Give latitude and longitude (deg) of the first line; None if there is none."""
         at = self._given.index("latitude_deg")
-        for lines, line in self._lines():
-            latitude, longitude = self._parse(lines[:1], line)[0, at : at + 2].tolist()
+        for text, line in self._texts():
+            first = text[: text.find(b"\n") + 1] or text
+            latitude, longitude = self._parse(first, line)[0, at : at + 2].tolist()
             return latitude, longitude
         return None
 
@@ -321,19 +324,56 @@ class CsvTable:
     def _mapped(self) -> set[str]:
         return {said.removeprefix("-") for said in self._reading.columns.values()}
 
-    def _parse(self, lines: list[str], first: int) -> Rows:
-        if not lines[-1].endswith("\n"):
-            raise LogError(
-                self.path, "does not end with a line end: truncated", line=first + len(lines) - 1
-            )
-        rows = self._loaded(lines)
+    def _parse(self, text: bytes, first: int) -> Rows:
+        count = text.count(b"\n")
+        if not text.endswith(b"\n"):
+            message = "does not end with a line end: truncated"
+            raise LogError(self.path, message, line=first + count)
+        rows = self._numbers(text, count)
         if rows is None:
-            rows = np.array([self._parse_line(text, first + i) for i, text in enumerate(lines)])
+            try:
+                lines = [f"{line}\n" for line in text[:-1].decode().split("\n")]
+            except UnicodeDecodeError:
+                raise LogError(self.path, f"is not UTF-8 text after line {first - 1}") from None
+            rows = self._loaded(lines)
+            if rows is None:
+                rows = np.array([self._parse_line(one, first + i) for i, one in enumerate(lines)])
         for k, factor in enumerate(self._factors):
             if factor != 1.0:
                 rows[:, k] *= factor
         self._check(rows, first)
         return rows
+
+    def _numbers(self, text: bytes, count: int) -> Rows | None:
+        """Read lines of plain numbers fast; None if there is anything else among them."""
+        said = self._reading
+        if said.decimal != "." or said.separator == " " or "time" in self._given:
+            return None
+        if count < FEW_LINES or not text.isascii():
+            return None
+        from pyarrow import ArrowInvalid, BufferReader, csv, float64  # here: slow to import
+
+        names = [str(k) for k in range(len(self._header))]
+        used = [names[k] for k in self._used]
+        with suppress(ArrowInvalid):  # the other ways to read say what is wrong, and where
+            table = csv.read_csv(
+                BufferReader(text),
+                csv.ReadOptions(use_threads=False, column_names=names, block_size=len(text)),
+                csv.ParseOptions(
+                    delimiter=said.separator, quote_char=False, ignore_empty_lines=False
+                ),
+                csv.ConvertOptions(
+                    include_columns=used, column_types=dict.fromkeys(used, float64()),
+                    null_values=[],
+                ),
+            )  # fmt: skip
+            if len(table) == count:  # a carriage return ends a line there, and none here
+                # Not to_numpy, which imports pandas.
+                (batch,) = table.to_batches()
+                columns = (one.buffers()[1] for one in batch.columns)
+                rows = np.column_stack([np.frombuffer(one, np.float64) for one in columns])
+                return None if np.isnan(rows).any() else rows  # it has more spellings there
+        return None
 
     def _loaded(self, lines: list[str]) -> Rows | None:
         """Read lines at once; None if one of them is not what it should be."""
@@ -421,12 +461,11 @@ class CsvTable:
             )
 
 
-def _without_blank_end(lines: list[str]) -> tuple[list[str], list[str]]:
+def _without_blank_end(text: bytes) -> tuple[bytes, bytes]:
     """Part lines where nothing but blank ones follow."""
-    end = len(lines)
-    while end and not lines[end - 1].strip():
-        end -= 1
-    return lines[:end], lines[end:]
+    last = len(text.rstrip())
+    end = text.find(b"\n", last) + 1 or len(text)
+    return (text[:end], text[end:]) if last else (b"", text)
 
 
 def _digits(cell: str) -> bool:

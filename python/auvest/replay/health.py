@@ -165,14 +165,15 @@ class Residuals:
         self.recoveries += int(measured["recovered"].sum())
         rows = {**measured, "range_m": batch.ranges_m}
         self._samples.add(rows)
-        echoes = measured["sensor"] == "echo"
-        self.refused += int((echoes & (measured["outcome"] == tables.REJECTED)).sum())
-        self.judged += int((echoes & ~np.isin(measured["outcome"], tables.UNUSED)).sum())
-        self.sensors.update(measured["sensor"].tolist())
+        self.sensors.update(tables.counts(measured["sensor"]))
+        became = tables.counts(measured["outcome"])
+        if batch.masters is not None:
+            self.refused += became.get(tables.REJECTED, 0)
+            self.judged += sum(n for name, n in became.items() if name not in tables.UNUSED)
         for source in np.unique(measured["source"]).tolist():
             mine = measured["source"] == source
             self.lines[int(source)] += int(mine.sum())
-            for outcome in tables.UNUSED:
+            for outcome in (name for name in tables.UNUSED if name in became):
                 self.unused[int(source), outcome] += int(
                     (measured["outcome"][mine] == outcome).sum()
                 )
@@ -234,11 +235,11 @@ def _expected(rows: Columns) -> tuple[float, float]:
 
 def truncated_moments(numbers: int, limit: float) -> tuple[float, float]:
     """Mean and standard deviation of a chi-square value of one or two numbers below a limit."""
-    from scipy import stats  # here, because it is slow to import
+    from scipy.special import chdtr  # here, because it is slow to import
 
-    inside = stats.chi2.cdf(limit, numbers)
-    mean = numbers * stats.chi2.cdf(limit, numbers + 2) / inside
-    square = numbers * (numbers + 2) * stats.chi2.cdf(limit, numbers + 4) / inside
+    inside = chdtr(numbers, limit)
+    mean = numbers * chdtr(numbers + 2, limit) / inside
+    square = numbers * (numbers + 2) * chdtr(numbers + 4, limit) / inside
     return float(mean), math.sqrt(float(square - mean * mean))
 
 

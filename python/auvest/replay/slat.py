@@ -545,13 +545,11 @@ class _Way:
     ) -> Floats:
         """Give range and bearing at the end of steps, as the means before them have it."""
         x, u, dt = self.before_x[row], self.u[row], self.dt[row]
-        if isinstance(motion, CompassMotion):
-            course = heading = u[:, 1]
-            shortened = math.exp(0.5 * motion.sigma_heading_rad**2) if motion.compensate_bias else 1
-            way = dt * u[:, 0] * shortened
-        else:
-            course, heading = x[:, 2], x[:, 2] + dt * u[:, 1]
-            way = dt * u[:, 0]
+        way: Floats = dt * u[:, 0]
+        course: Floats = u[:, 1] if isinstance(motion, CompassMotion) else x[:, 2]
+        heading: Floats = x[:, -1] + dt * u[:, 1]  # of a pose that has one
+        if isinstance(motion, CompassMotion) and motion.compensate_bias:
+            way = way * math.exp(0.5 * motion.sigma_heading_rad**2)
         slave = x[:, :2] + way[:, None] * np.column_stack([np.cos(course), np.sin(course)])
         master = self.before_masters[row, number]
         step = dt[:, None]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -124,6 +125,17 @@ def pose(
         "var_y_m2": covariance[:, 1, 1],
         "sigma_heading_rad": sigma_heading,
     }
+
+
+def counts(words: npt.NDArray[Any]) -> dict[str, int]:
+    """Count the words of a column; nearly all are the same few, in a row."""
+    found: dict[str, int] = {}
+    begins = np.flatnonzero(words[1:] != words[:-1]) + 1
+    edges = [0, *begins.tolist(), len(words)] if len(words) else [0]
+    for begin, end in itertools.pairwise(edges):
+        word = str(words[begin])
+        found[word] = found.get(word, 0) + end - begin
+    return found
 
 
 def settled_s(estimates: Columns) -> float:

@@ -44,8 +44,7 @@ class Tally:
     def add(self, batch: Batch) -> None:
         """Take one batch."""
         measured, errors = batch.measurements, batch.errors
-        names, counts = np.unique(measured["outcome"], return_counts=True)
-        for name, count in zip(names.tolist(), counts.tolist(), strict=True):
+        for name, count in tables.counts(measured["outcome"]).items():
             self.outcomes[name] += count
         self.recovered += int(measured["recovered"].sum())
         self.near_field += int(measured["near_field"].sum())
