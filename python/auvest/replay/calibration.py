@@ -33,8 +33,8 @@ from auvest.replay import diagnosis
 from auvest.replay.checks import filter_of
 from auvest.replay.config import FilterName, Settings
 from auvest.replay.engine import replay_of
-from auvest.replay.health import FEW, Residuals
-from auvest.replay.tables import Columns
+from auvest.replay.health import COLUMNS, FEW
+from auvest.replay.tables import Batch, Columns
 
 #: The search leaves no noise this many times larger or smaller than the settings have it.
 REACH = 1000.0
@@ -278,7 +278,8 @@ def autocorrelation_time(parts: Sequence[Columns]) -> float:
     Parameters
     ----------
     parts : sequence of mapping
-        Innovations of one log each, in the order of time, as :class:`Residuals` gives them.
+        Innovations of one log each, in the order of time, with the columns
+        :data:`auvest.replay.health.COLUMNS`.
 
     Notes
     -----
@@ -357,12 +358,10 @@ class _Likelihood:
     def rows(self, logarithms: Floats) -> list[Columns]:
         """Give the innovations of each log."""
         settings = with_noises(self._settings, self._noises, np.exp(logarithms).tolist())
-        found = []
+        found: list[Columns] = []
         for log in self._logs:
-            residuals = Residuals()
-            for batch in replay_of(log, settings, self._name).batches():
-                residuals.add(batch)
-            found.append(residuals.rows())
+            parts = [_compared(batch) for batch in replay_of(log, settings, self._name).batches()]
+            found.append({name: np.concatenate([one[name] for one in parts]) for name in COLUMNS})
         return found
 
     def __call__(self, logarithms: Floats) -> float:
@@ -437,6 +436,13 @@ def _held(log: LogFolder, settings: Settings, name: FilterName) -> LogFolder:
     local = shifted(log, local_origin(log))
     start = replay_of(local, settings, name).start
     return HeldLog(local, diagnosis.LINES, start if math.isfinite(start[0]) else None)
+
+
+def _compared(batch: Batch) -> Columns:
+    """Give the measurements of a batch that were compared with a prediction, as judged later."""
+    rows = {**batch.measurements, "range_m": batch.ranges_m}
+    compared = ~np.isnan(rows["nis"])
+    return {name: rows[name][compared] for name in COLUMNS}
 
 
 def _profile(

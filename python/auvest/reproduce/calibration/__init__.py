@@ -1,0 +1,1 @@
+"""Noises ten times off, and what calibration makes of them."""

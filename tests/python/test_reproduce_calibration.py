@@ -1,0 +1,55 @@
+"""Noises ten times off: what counts, and that the page is what was measured."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from auvest.importers.sets import IMPORTERS
+from auvest.logs import LogFolder
+from auvest.replay import find_settings
+from auvest.replay.calibration import calibrate
+from auvest.reproduce.calibration import measure
+from auvest.reproduce.calibration.measure import Bench, Figures, Row
+
+DATA = os.environ.get("AUVEST_DATA")
+needs_data = pytest.mark.skipif(
+    DATA is None, reason="AUVEST_DATA does not name the folder of the validation recordings"
+)
+
+
+def test_what_holds() -> None:
+    good = Figures(1.0, 0.99, 1.2)
+    row = Row("goats14", "all", 0.1, Figures(5.0, 0.1, 0.2), replace(good, rmse_m=1.14), 200, 1.0)
+    documented = {"goats14": good}
+    assert Bench(documented, [row]).held() == {"goats14": True, "goats14, sigmas": True}
+    for right, held in (
+        (Figures(1.16, 0.99, 1.2), (False, True)),  # 15 % and no more
+        (Figures(1.0, 0.94, 1.2), (True, False)),  # sigmas too small
+        (Figures(1.0, 0.99, 2.1), (True, False)),  # and too large
+    ):
+        bench = Bench(documented, [row, replace(row, right=right)])
+        assert tuple(bench.held().values()) == held
+    # Without a truth there is nothing to compare sigmas with.
+    row = replace(row, set_name="ugps_pier59", right=Figures(0.6, None, None))
+    bench = Bench({"ugps_pier59": Figures(0.6, None, None)}, [row])
+    assert bench.held() == {"ugps_pier59": True}
+
+
+@needs_data
+@pytest.mark.parametrize("times", measure.OFF)
+def test_a_recording_brings_its_noises_back(tmp_path: Path, times: float) -> None:
+    assert DATA is not None
+    name = "labyrinth_uwb"
+    logs = [LogFolder(one) for one in IMPORTERS[name](Path(DATA) / name, tmp_path)]
+    spoilt = measure.spoilt(logs[0], find_settings(name))["all", times]
+    documented = measure.figures(logs, find_settings(name))
+    row = Row(
+        name, "all", times, measure.figures(logs, spoilt),
+        measure.figures(logs, calibrate(logs, spoilt).settings), 0, 0.0,
+    )  # fmt: skip
+    assert not all(Bench({name: documented}, [replace(row, right=row.wrong)]).held().values())
+    assert all(Bench({name: documented}, [row]).held().values())
