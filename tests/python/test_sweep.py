@@ -163,7 +163,7 @@ def log(tmp_path: Path) -> Path:
     folder.mkdir()
     rng = np.random.default_rng(1)
     (folder / "beacons.csv").write_text("source,x_m,y_m\n0,50,0\n1,0,50\n")
-    lines = ["time_s,dt_s,speed_m_s,turn_rate_rad_s"]
+    lines = ["time_s,dt_s,speed_m_s,yaw_rate_rad_s"]
     lines += [f"{k},1,1.0,0.0" for k in range(60)]
     (folder / "odometry.csv").write_text("\n".join(lines) + "\n")
     truth, ranges = ["time_s,x_m,y_m,heading_rad"], ["time_s,source,range_m"]
