@@ -26,7 +26,7 @@ def tracks(result: Reproduction) -> Figure:
     for i, style in enumerate(("--", ":")):
         fleet.plot(*over.leaders[shown, i].T, style, color=plots.GREY, label=f"leader {i + 1}")
     plots.style_plane(fleet)
-    hours = over.time_h[shown]
+    hours = np.arange(1, 1 + len(over.slave[shown])) / 3600.0  # steps of 1 s
     panels = figure.add_subplot(grid[0, 1]), figure.add_subplot(grid[1, 1])
     for name, error in over.errors.items():
         ways = plots.off_track(over.slave[shown], over.slave[shown] + error[shown])
