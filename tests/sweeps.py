@@ -105,7 +105,7 @@ def stopped_and_resumed(settings: Settings, folder: Path) -> Any:
         auvest.sweep(settings, output=folder, workers=2, progress=after(len(whole) // 3, interrupt))
     except Interrupted as stop:
         done = stop.partial.computed
-        result = auvest.sweep(settings, output=folder, workers=2)
+        result = auvest.sweep(settings, output=folder, workers=1)
         assert done == len(whole) // 3, done
         assert result.computed == len(whole) - done, result.computed
         return result

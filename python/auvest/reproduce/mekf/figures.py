@@ -19,7 +19,7 @@ def tracks(result: Reproduction) -> Figure:
     """Draw Fig 5: tracks of slave and leaders, and the errors of one run across and along them."""
     over = result.over_time
     shown = slice(0, _SHOWN)
-    figure = plots.new_figure((9.0, 5.2), "Fig. 5: tracks, 5 % of the ranges at 10 sigma")
+    figure = plots.new_figure((8.4, 5.0), "Fig. 5: tracks, 5 % of the ranges at 10 sigma")
     grid = figure.add_gridspec(2, 2, width_ratios=(1.0, 1.5))
     fleet = figure.add_subplot(grid[:, 0])
     fleet.plot(*over.slave[shown].T, color=plots.BLACK, label="slave", linewidth=1.2)
@@ -46,7 +46,7 @@ def error_over_time(result: Reproduction) -> Figure:
     """Draw Fig 6: error over time of both filters, and the improvement."""
     over = result.over_time
     figure = plots.new_figure(
-        (9.0, 6.0), f"Fig. 6: position error over time, RMS of {result.runs} runs"
+        (8.4, 5.6), f"Fig. 6: position error over time, RMS of {result.runs} runs"
     )
     error, gain = figure.subplots(2, 1, sharex=True)
     for name, rms in over.rms_m.items():
@@ -62,7 +62,7 @@ def error_over_time(result: Reproduction) -> Figure:
 
 def kernels(result: Reproduction) -> Figure:
     """Draw the RMSE of every kernel over the share of outliers, and by timing and world."""
-    figure = plots.new_figure((12.0, 5.0), "RMSE of the kernels")
+    figure = plots.new_figure((8.4, 4.6), "RMSE of the kernels")
     over, bars = figure.subplots(1, 2, width_ratios=(2, 3))
     for name in KERNELS:
         points = [
@@ -97,7 +97,7 @@ def kernels(result: Reproduction) -> Figure:
 
 def consistency(result: Reproduction) -> Figure:
     """Draw means of NEES and NIS over their expectation, with the 95 % bounds."""
-    figure = plots.new_figure((10.0, 5.0), "Consistency: right and wrong Q and R")
+    figure = plots.new_figure((8.4, 4.6), "Consistency: right and wrong Q and R")
     factors = list(dict.fromkeys((j.q_factor, j.r_factor) for j in result.consistency))
     filters = list(dict.fromkeys(j.filter for j in result.consistency))
     panels = figure.subplots(1, 2, sharey=True)
