@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from auvest import metrics as metrics
     from auvest import montecarlo as montecarlo
+    from auvest import plots as plots
     from auvest import simulation as simulation
     from auvest._core import Convergence as Convergence
     from auvest._core import Decision as Decision
@@ -81,7 +82,7 @@ if TYPE_CHECKING:
 else:
     from importlib import import_module
 
-    _SUBMODULES = ("metrics", "montecarlo", "simulation")
+    _SUBMODULES = ("metrics", "montecarlo", "plots", "simulation")
     _HOME = {
         "Aukf": "filters",
         "BodyVelocity": "models",

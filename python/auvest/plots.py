@@ -1,5 +1,7 @@
 """Figures: one style, colours that colour-blind readers can tell apart, units on every axis.
 
+For runs of your own: :func:`nees` and :func:`nis`, with their bounds.
+
 The functions return :class:`matplotlib.figure.Figure` objects and never touch pyplot or the global
 style, so they can be used in any program and thread; :func:`save` writes one as a PNG.
 """
@@ -20,6 +22,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from auvest import metrics
 from auvest._outputs import new_file
 
 Floats = npt.NDArray[np.float64]
@@ -64,6 +67,22 @@ FILTER_DASHES: Mapping[str, tuple[float, ...]] = {
     "slatf-joint": (10, 4),
     "ekf-slat": (6, 2, 2, 2, 2, 2),
 }
+#: The same for the filters of localisation and tracking, which share no figure with the others.
+SLAT_COLOURS: Mapping[str, str] = {
+    "dr": BLACK,
+    "dr_compensated": GREY,
+    "slatf1": VERMILION,
+    "slatf2": BLUE,
+    "slatf_joint": ORANGE,
+    "ekf_slat": GREEN,
+}
+#: And for the robust EKF where its kernels stand beside each other: the paper's has its colour.
+KERNEL_COLOURS: Mapping[str, str] = {
+    "ekf": FILTER_COLOURS["ekf"],
+    "igg": FILTER_COLOURS["robust-ekf"],
+    "huber": ORANGE,
+    "hampel": BROWN,
+}
 _CYCLE = (BLUE, VERMILION, GREEN, ORANGE, SKY, GREY)
 
 
@@ -90,7 +109,7 @@ def track_figure(
     label: str = "estimated",
     colour: str = BLUE,
 ) -> Figure:
-    """Draw reference, observed and estimated track, and how far they lie from the reference.
+    """Draw a track, and how far observations and estimate lie off it: across and along.
 
     Parameters
     ----------
@@ -104,23 +123,68 @@ def track_figure(
         Name and colour of the estimated track.
     """
     figure = new_figure((8.0, 4.4), title)
-    grid = figure.add_gridspec(2, 2, width_ratios=(1.0, 1.5))
+    grid = figure.add_gridspec(2, 2, width_ratios=(1.0, 2.2))
     plane = figure.add_subplot(grid[:, 0])
-    _draw_tracks(plane, truth, estimate, observed, station, label, colour)
+    plane.plot(*truth.T, "-", color=BLACK, linewidth=1.6, label="the track: 0 at the right")
+    plane.plot(
+        *station, "^", color=GREEN, markersize=8, label="station and start", linestyle="none"
+    )
+    style_plane(plane)
     steps = np.arange(1, len(truth) + 1)
-    for row, name in enumerate("xy"):
-        axes = figure.add_subplot(grid[row, 1])
+    ways = zip(off_track(truth, observed), off_track(truth, estimate), strict=True)
+    first = None
+    for row, (name, (seen, estimated)) in enumerate(zip(("across", "along"), ways, strict=True)):
+        axes = figure.add_subplot(grid[row, 1], sharex=first, sharey=first)
         axes.plot(
-            steps, observed[:, row] - truth[:, row], "-.", color=GREY, linewidth=0.7, marker=".",
-            markersize=3,
-        )  # fmt: skip
-        axes.plot(steps, estimate[:, row] - truth[:, row], "--", color=colour, linewidth=1.8)
-        axes.axhline(0.0, color=BLACK, linewidth=1.6, zorder=1)
-        style(axes, ylabel=f"{name} off the reference / m")
+            steps, seen, "-.", color=GREY, linewidth=0.7, marker=".", markersize=3, label="observed"
+        )
+        axes.plot(steps, estimated, "-", color=colour, linewidth=1.8, label=label)
+        axes.axhline(0.0, color=BLACK, linewidth=1.2, zorder=1)
+        style(axes, ylabel=f"{name} the track / m")
+        if first is None:
+            first = axes
+            axes.tick_params(labelbottom=False)
     axes.set_xlabel("step")
-    style(plane)
-    legend_below(figure, plane, columns=4)
+    handles, labels = plane.get_legend_handles_labels()
+    own_handles, own_labels = axes.get_legend_handles_labels()
+    figure.legend(
+        handles + own_handles,
+        labels + own_labels,
+        loc="outside lower center",
+        ncols=4,
+        fontsize=9,
+        frameon=False,
+    )
     return figure
+
+
+def off_track(truth: Floats, places: Floats) -> tuple[Floats, Floats]:
+    """Give how far places lie off a track, m: across it (to the left) and along it (ahead).
+
+    Parameters
+    ----------
+    truth, places : ndarray, shape (T, 2)
+        Points of the track, and what is compared with each.
+
+    Returns
+    -------
+    (ndarray, ndarray), shape (T,)
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> north = np.array([[0.0, 0.0], [0.0, 1.0], [0.0, 2.0]])
+    >>> across, along = off_track(north, north + [0.5, 0.1])  # to the right, and ahead
+    >>> across.tolist(), along.round(3).tolist()
+    ([-0.5, -0.5, -0.5], [0.1, 0.1, 0.1])
+    """
+    course = np.gradient(truth, axis=0)
+    length = np.hypot(*course.T)
+    ahead = course / np.where(length > 0, length, 1.0)[:, None]
+    error = places - truth
+    across: Floats = ahead[:, 0] * error[:, 1] - ahead[:, 1] * error[:, 0]
+    along: Floats = (ahead * error).sum(axis=1)
+    return across, along
 
 
 def step_figure(
@@ -190,7 +254,7 @@ def simulation_figure(
     _draw_tracks(plane, truth, estimate, observed, station, label, colour)
     style(plane)
     plane.set_title("tracks, one run", loc="left")
-    _legend_inside(plane)
+    legend_inside(plane)
 
     pace = figure.add_subplot(grid[0, 1])
     _draw_lines(pace, intervals)
@@ -254,7 +318,7 @@ def capture_figure(
     plane.plot(*station, "^", color=GREEN, markersize=8, label="station", linestyle="none")
     style_plane(plane)
     plane.set_title("tracks", loc="left")
-    _legend_inside(plane)
+    legend_inside(plane)
 
     rows = (
         ("interval to the next sample", "T / s", interval_s),
@@ -272,7 +336,7 @@ def capture_figure(
             axes.axhline(5.99, color=BLACK, linewidth=0.8, linestyle="--")
             axes.plot(missing, np.zeros_like(missing), "|", color=VERMILION, label="missed")
             if missing.size:
-                _legend_inside(axes)
+                legend_inside(axes)
             axes.set_xlabel("time / s")
         else:
             axes.tick_params(labelbottom=False)
@@ -349,6 +413,137 @@ def slave_figure(
     axes.plot(time_s, sigma_m, ":", color=BLUE, label="claimed sigma, that run")
     style(plane, legend=8, xlabel="x / m", ylabel="y / m")
     style(axes, legend=8, xlabel="time / s", ylabel="position error / m", ylim=(0, None))
+    return figure
+
+
+def nees(
+    error: npt.ArrayLike,
+    P: npt.ArrayLike,
+    *,
+    time_s: npt.ArrayLike | None = None,
+    level: float = 0.95,
+    title: str = "NEES",
+) -> Figure:
+    """Draw the normalised estimation error squared of your own runs, with its bounds.
+
+    Parameters
+    ----------
+    error : array_like, shape (T, k) or (runs, T, k)
+        Errors of the estimate; components that are angles must be wrapped.
+    P : array_like, shape (T, k, k) or (runs, T, k, k)
+        Covariances that the filter claims of them.
+    time_s : array_like, shape (T,), optional
+        Time of each row, s; default: the steps are counted.
+    level : float
+        Probability of lying between the bounds, in (0, 1).
+    title : str
+        Above the figure.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The mean over the runs; a filter that is consistent stays between the bounds at ``level`` of
+        the steps, one that is too sure of itself lies above them. Errors of one run are correlated
+        over time: with few runs it stays on one side for long.
+
+    Raises
+    ------
+    ValueError
+        If the shapes do not fit.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from auvest import plots
+    >>> rng = np.random.default_rng(1)
+    >>> error = rng.normal(size=(20, 100, 2))
+    >>> figure = plots.nees(error, np.broadcast_to(np.eye(2), (20, 100, 2, 2)))
+    >>> figure.axes[0].get_ylabel()
+    'NEES, mean of 20 runs'
+    """
+    e = np.asarray(error, np.float64)
+    return _consistency_figure("NEES", metrics.nees(e, P), e.shape[-1], time_s, level, title)
+
+
+def nis(
+    values: npt.ArrayLike,
+    dof: int,
+    *,
+    time_s: npt.ArrayLike | None = None,
+    level: float = 0.95,
+    title: str = "NIS",
+) -> Figure:
+    """Draw the normalised innovation squared of your own runs, with its bounds.
+
+    Parameters
+    ----------
+    values : array_like, shape (T,) or (runs, T)
+        As ``nis`` of a filter's results; NaN where there is no measurement.
+    dof : int
+        Numbers in a measurement: 1 for a range, 2 for range and bearing.
+    time_s, level, title
+        As for :func:`nees`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The mean over the runs. Innovations of a consistent filter are independent: the mean over
+        all of them, which is in the title of the axes, has bounds that one run already makes tight.
+
+    Raises
+    ------
+    ValueError
+        If the shapes do not fit, or nothing is finite.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from auvest import plots
+    >>> values = np.random.default_rng(1).chisquare(2, size=200)
+    >>> plots.nis(values, 2).axes[0].get_title(loc="left")
+    'mean of all: 2.10, consistent: 1.73 to 2.29 (95 %)'
+    """
+    return _consistency_figure("NIS", np.asarray(values, np.float64), dof, time_s, level, title)
+
+
+def _consistency_figure(
+    name: str,
+    values: Floats,
+    dof: int,
+    time_s: npt.ArrayLike | None,
+    level: float,
+    title: str,
+) -> Figure:
+    runs = values[np.newaxis] if values.ndim == 1 else values
+    if runs.ndim != 2:
+        raise ValueError(f"{name} has shape {values.shape}, expected (T,) or (runs, T)")
+    judge = metrics.nis_consistency if name == "NIS" else metrics.nees_consistency
+    judged = judge(runs, dof, level)
+    x = np.arange(1, runs.shape[1] + 1) if time_s is None else np.asarray(time_s, np.float64)
+    if x.shape != runs.shape[1:]:
+        raise ValueError(f"time_s has shape {x.shape}, expected {runs.shape[1:]}")
+    known = np.isfinite(runs)
+    counts = known.sum(axis=0)
+    mean = np.full(len(x), np.nan)
+    np.divide(np.where(known, runs, 0.0).sum(axis=0), counts, out=mean, where=counts > 0)
+    bounds = {n: metrics.chi2_bounds(dof, n, level) for n in set(counts.tolist()) - {0}}
+    low, high = np.array([bounds.get(n, (np.nan, np.nan)) for n in counts.tolist()]).T
+    figure, axes = new_axes((6.6, 3.8), title)
+    axes.fill_between(
+        x, low, high, step="mid", color=GREY, alpha=0.25, linewidth=0, label=f"{level:.0%} bounds"
+    )
+    axes.axhline(dof, color=BLACK, linewidth=0.8, linestyle="--", label=f"expected: {dof}")
+    axes.plot(x, mean, ".-", color=BLUE, linewidth=1.2, markersize=3.5, label=name)
+    what = "all" if name == "NIS" else "the runs at the last step"
+    style(
+        axes,
+        title=f"mean of {what}: {judged.mean:.2f}, consistent: {judged.low:.2f} to "
+        f"{judged.high:.2f} ({100 * level:g} %)",
+        xlabel="step" if time_s is None else "time / s",
+        ylabel=name if len(runs) == 1 else f"{name}, mean of {len(runs)} runs",
+        ylim=(0.0, None),
+    )
+    legend_below(figure, axes, columns=3)
     return figure
 
 
@@ -454,7 +649,8 @@ def _legend_above(axes: Axes) -> None:
     axes.title.set_fontsize(10.5)
 
 
-def _legend_inside(axes: Axes) -> None:
+def legend_inside(axes: Axes) -> None:
+    """Put the legend of axes where least is drawn."""
     axes.legend(fontsize=9, framealpha=0.85, edgecolor="none", loc="best")
 
 

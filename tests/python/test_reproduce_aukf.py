@@ -17,8 +17,10 @@ from auvest import Aukf, MahalanobisInterval
 from auvest.cli import app
 from auvest.commands import reproduce
 from auvest.commands.console import to_json
+from auvest.reproduce import claims as every_claim
 from auvest.reproduce.aukf import claims as aukf_claims
 from auvest.reproduce.aukf import measure as aukf
+from auvest.reproduce.claims import TOO_FEW
 from auvest.reproduce.markdown import fill, number, table
 from auvest.simulation.paper_aukf import (
     ASSUMPTIONS,
@@ -146,7 +148,12 @@ def test_claims_cover_every_figure(output: dict[str, Any]) -> None:
     assert len(output["assumptions"]) == len(ASSUMPTIONS)
 
 
-def test_verdicts_follow_the_numbers(small: aukf.Reproduction) -> None:
+def test_verdicts_follow_the_numbers(
+    small: aukf.Reproduction, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert {claim.verdict for claim in aukf_claims.claims(small)} == {TOO_FEW}  # six runs
+    monkeypatch.setattr(every_claim, "LEAST_RUNS", 6)
+
     def verdict(result: aukf.Reproduction, where: str) -> str:
         return next(c.verdict for c in aukf_claims.claims(result) if c.where == where)
 

@@ -177,6 +177,7 @@ def test_command(tmp_path, monkeypatch):
         ".auvest.json",
         "README.md",
         "intervals.png",
+        "intervals.svg",
         "results.json",
     ]
     assert re.search(r"\| near, turning \| normal \| 0.40 ", (tmp_path / "README.md").read_text())

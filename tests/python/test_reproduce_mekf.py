@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 
 from auvest import metrics
 from auvest.cli import app
+from auvest.reproduce.claims import TOO_FEW
 from auvest.reproduce.mekf import claims as mekf_page
 from auvest.reproduce.mekf import measure as mekf
 from auvest.simulation import cooperative
@@ -177,7 +178,7 @@ def made_up_reproduction(**changes):
     displaced = mekf.Displaced(back=12, slowest=9, settled=12, median_end_m=1.0, rmse_end_m=1.0)
     lost = mekf.Displaced(back=0, slowest=None, settled=0, median_end_m=9.0, rmse_end_m=9.0)
     values = {
-        "runs": 2,
+        "runs": 20,
         "seed": 1,
         "contamination": contamination,
         "timing": {
@@ -215,8 +216,16 @@ def verdicts(**changes):
     return [claim.holds for claim in mekf_page.claims(made_up_reproduction(**changes))]
 
 
+def test_the_papers_claims_are_apart_from_targets_of_our_own():
+    judged = mekf_page.claims(made_up_reproduction())
+    assert [c.where for c in judged if not c.own] == ["paper, section 4", "paper, section 2"]
+    assert {c.where for c in judged if c.own} == {"target"}
+    assert mekf_page.claims(made_up_reproduction(runs=2))[0].verdict == TOO_FEW
+
+
 def test_claims_follow_the_numbers():
     assert verdicts() == [True] * 7
+    assert verdicts(runs=19) == [None] * 7  # too few to judge by
     contamination = made_up_reproduction().contamination
 
     def at(key, **rmse_m):

@@ -21,7 +21,8 @@ from typer.testing import CliRunner, Result
 from auvest.cli import app
 from auvest.commands import reproduce, simulate_slatf
 from auvest.commands.console import to_json
-from auvest.reproduce.claims import NO, YES
+from auvest.reproduce import claims as every_claim
+from auvest.reproduce.claims import NO, TOO_FEW, YES
 from auvest.reproduce.slatf import claims as slatf_claims
 from auvest.reproduce.slatf import measure as slatf
 from auvest.reproduce.slatf.figures import FIGURES
@@ -124,8 +125,12 @@ def verdict(result: slatf.Reproduction, words: str) -> str:
     return claim.verdict
 
 
-def test_verdicts_follow_the_numbers(small: slatf.Reproduction) -> None:
+def test_verdicts_follow_the_numbers(
+    small: slatf.Reproduction, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The sign of a claim turns when the results are exchanged."""
+    assert {claim.verdict for claim in slatf_claims.claims(small)} == {TOO_FEW}  # three runs
+    monkeypatch.setattr(every_claim, "LEAST_RUNS", 3)
     words = "1.0 becomes worse when the sonar becomes more precise"
     levels = {n: dict(row) for n, row in small.levels.items()}
     loud, precise = levels[1]["slatf1"], levels[4]["slatf1"]

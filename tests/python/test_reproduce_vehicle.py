@@ -90,6 +90,7 @@ def test_the_command_makes_page_and_pictures(tmp_path):
     document = json.loads(done.stdout)
     assert all(check["ok"] for check in document["checks"])
     assert {path.name for path in tmp_path.iterdir()} == {
-        ".auvest.json", "README.md", "results.json", "closed_loop.png", "tracks.png",
+        ".auvest.json", "README.md", "results.json", "closed_loop.png", "closed_loop.svg",
+        "tracks.png", "tracks.svg",
     }  # fmt: skip
     assert document["closed_loop"][0]["runs"] == 2

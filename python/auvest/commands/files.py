@@ -58,10 +58,12 @@ def save_figures(
     progress: console.ProgressCallback,
     done: list[Path],
 ) -> None:
-    """Draw each figure of a result and write it as PNG under its name."""
+    """Draw each figure of a result and write it as PNG and SVG under its name."""
     from auvest import plots  # here, because matplotlib takes long to import
 
     with plots.own_style():
         for number, (stem, draw) in enumerate(figures.items(), start=1):
-            done.append(plots.save(draw(result), folder / f"{stem}.png"))
+            figure = draw(result)
+            for kind in ("png", "svg"):
+                done.append(plots.save(figure, folder / f"{stem}.{kind}"))
             progress(number, len(figures))

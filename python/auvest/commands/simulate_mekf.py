@@ -208,7 +208,10 @@ def _figure(results: dict[str, Result], kernel: str, kind: str) -> Figure:
     per_step = means_per_step(results)
     figure = plots.new_figure((9.0, 6.5), "Position error and weights")
     error, weights = figure.subplots(2, 1, sharex=True)
-    names = {"plain": (kind.upper(), plots.GREEN), "robust": (f"{kernel}", plots.BLUE)}
+    names = {
+        "plain": (kind.upper(), plots.FILTER_COLOURS[kind]),
+        "robust": (kernel, plots.FILTER_COLOURS[f"robust-{kind}"]),
+    }
     for name, result in results.items():
         label, colour = names[name]
         hours = per_step["time_s"] / 3600

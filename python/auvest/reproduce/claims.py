@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Generic, TypeVar
 
 from auvest import _texts
@@ -14,6 +14,11 @@ T = TypeVar("T")
 YES = "reproduced"
 PARTLY = "partly reproduced"
 NO = "not reproduced"
+
+#: A verdict rests on so many runs at least: of fewer the standard error itself is known to no
+#: better than 1 / sqrt(2 (n - 1)), a sixth.
+LEAST_RUNS = 20
+TOO_FEW = "not judged: too few runs"
 
 
 @dataclass(frozen=True)
@@ -53,6 +58,13 @@ class Claims(Generic[T]):
 def graded(yes: bool = False, *, partly: bool = False) -> str:
     """Make a verdict."""
     return YES if yes else PARTLY if partly else NO
+
+
+def settled(judged: Iterable[Claim], runs: int) -> list[Claim]:
+    """Withhold verdicts that would rest on too few runs."""
+    if runs >= LEAST_RUNS:
+        return list(judged)
+    return [replace(claim, verdict=TOO_FEW) for claim in judged]
 
 
 def tally(judged: list[Claim]) -> str:

@@ -6,6 +6,7 @@ out a few at a time to each, so that one that is lost with its worker is soon gi
 
 from __future__ import annotations
 
+import asyncio
 import math
 import time
 import warnings
@@ -24,7 +25,9 @@ from auvest.sweeps.worker import attempt, report
 _AHEAD = 2
 #: How often it is looked which workers there are, s.
 _LOOK_S = 1.0
-#: So long it is waited for a worker, s.
+#: Rows that are done are on their way for so long at most, s.
+_FETCH_S = 10.0
+#: So long it is waited for a worker, s; the second where others were refused.
 _PATIENCE_S, _PATIENCE_REFUSED_S = 60.0, 5.0
 
 
@@ -68,7 +71,7 @@ class Dask:
             if not isinstance(client, Client):
                 try:
                     client = stack.enter_context(Client(self._scheduler, timeout=20))
-                except (OSError, ValueError, TimeoutError) as error:
+                except (OSError, ValueError, asyncio.TimeoutError) as error:
                     raise SweepError(f"no scheduler at {self._scheduler}: {error}") from None
             yield from _Run(client, self.refused, self._warn).rows(tasks)
 
@@ -105,14 +108,20 @@ class _Run:
                 idle = -math.inf
                 try:
                     ready = wait(list(self._sent), timeout=_LOOK_S, return_when="FIRST_COMPLETED")
-                except TimeoutError:
+                except asyncio.TimeoutError:
                     continue
                 for future in ready.done:
-                    task, _ = self._sent.pop(future)
-                    if future.status == "finished":
-                        yield task, rows_of(task, future.result())
-                    else:
-                        self._lose(task, f"{future.status} {future.exception() or ''}")
+                    task, worker = self._sent.pop(future)
+                    if future.status != "finished":
+                        why = future.exception() if future.status == "error" else future.status
+                        self._lose(task, str(why))
+                        continue
+                    try:
+                        answer = future.result(timeout=_FETCH_S)
+                    except asyncio.TimeoutError:
+                        self._sent[future] = (task, worker)  # lost with its worker, or slow
+                        continue
+                    yield task, rows_of(task, answer)
         finally:
             if self._sent:
                 self._client.cancel(list(self._sent), force=True)

@@ -27,7 +27,7 @@ Parameters: TypeAlias = dict[str, Any]
 #: Time that a task takes about, s: long beside what it costs to hand one out.
 _TASK_S = 5.0
 #: Rows of a task at most, where runs are short.
-_MOST_ROWS = 1_000_000
+_MOST_ROWS = 200_000
 _MOST_POINTS = 100_000
 _MOST_TASKS = 1_000_000
 

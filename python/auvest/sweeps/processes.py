@@ -116,11 +116,14 @@ class Processes:
                     return
                 done.put((task, self._answer(number, task)))
         finally:
-            process = self._running.pop(number, None)
-            if process is not None:
-                cast(IO[bytes], process.stdin).close()
-                process.kill()
-                process.wait()
+            self._end(number)
+
+    def _end(self, number: int) -> None:
+        """End a process, if there is one, and its pipes."""
+        process = self._running.pop(number, None)
+        if process is not None:
+            process.kill()
+            process.communicate()
 
     def _answer(self, number: int, task: Task) -> Columns | Failure:
         for _ in range(ATTEMPTS):
@@ -129,15 +132,14 @@ class Processes:
             if number not in self._running:
                 self._running[number] = _start()
             process = self._running[number]
+            asked, told = cast(IO[bytes], process.stdin), cast(IO[bytes], process.stdout)
             try:
-                pickle.dump(task, cast(IO[bytes], process.stdin))
-                cast(IO[bytes], process.stdin).flush()
-                answer: Columns | Failure = pickle.load(cast(IO[bytes], process.stdout))
+                pickle.dump(task, asked)
+                asked.flush()
+                answer: Columns | Failure = pickle.load(told)
                 return answer
             except (EOFError, OSError, pickle.UnpicklingError):
-                process.kill()
-                process.wait()
-                self._running.pop(number, None)
+                self._end(number)
         return Failure(f"its process has ended {ATTEMPTS} times without an answer")
 
 

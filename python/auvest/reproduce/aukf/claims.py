@@ -24,7 +24,7 @@ from auvest.reproduce.aukf.measure import (
     rmse,
     roughness,
 )
-from auvest.reproduce.claims import NO, PARTLY, YES, Claim, Claims, graded
+from auvest.reproduce.claims import NO, PARTLY, YES, Claim, Claims, graded, settled
 from auvest.reproduce.estimate import Estimate, all_below_zero
 from auvest.reproduce.markdown import number, series
 from auvest.simulation.paper_aukf import FIXED_INTERVAL_S, NOISE_KINDS, STEPS, NoiseKind
@@ -39,7 +39,7 @@ _claim = Claims(__name__, Claim)
 
 def claims(result: Reproduction) -> list[Claim]:
     """Every claim of the paper that its text makes about the simulation, judged."""
-    return [
+    judged = [
         *_introduction(result),
         *_law_claims(result),
         *_track_claims(result),
@@ -47,6 +47,7 @@ def claims(result: Reproduction) -> list[Claim]:
         *_tau0_claims(result),
         *_error_claims(result),
     ]
+    return settled(judged, result.runs)
 
 
 def _introduction(result: Reproduction) -> Iterator[Claim]:

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
-from auvest.reproduce.claims import Claims
+from auvest.reproduce.claims import LEAST_RUNS, TOO_FEW, Claims
 from auvest.reproduce.mekf.measure import CONTAMINATION, Reproduction
 
 
 @dataclass(frozen=True)
 class Claim:
-    """A claim or a target, what was measured, and whether it holds."""
+    """A claim or a target, what was measured, and whether it holds; None: of too few runs."""
 
     where: str
     claim: str
     measured: str
-    holds: bool
+    holds: bool | None
 
     def as_dict(self) -> dict[str, object]:
         """As JSON takes it."""
@@ -25,14 +25,28 @@ class Claim:
     @property
     def verdict(self) -> str:
         """In words."""
+        if self.holds is None:
+            return TOO_FEW
         return "holds" if self.holds else "does not hold"
+
+    @property
+    def own(self) -> bool:
+        """Whether it is a target of this project, and no claim of the paper."""
+        return self.where == "target"
 
 
 _claim = Claims(__name__, Claim)
 
 
-def claims(result: Reproduction) -> Iterator[Claim]:
-    """Judge the paper's claim and the targets of this project."""
+def claims(result: Reproduction) -> list[Claim]:
+    """Judge the paper's claims and the targets of this project."""
+    judged = list(_judged(result))
+    if result.runs >= LEAST_RUNS:
+        return judged
+    return [replace(claim, holds=None) for claim in judged]
+
+
+def _judged(result: Reproduction) -> Iterator[Claim]:
     better, worse = result.improvement, result.loss
     yield _claim("improvement", better >= 0.3, percent=100 * better)
     yield _claim("loss", worse <= 0.03, percent=100 * worse)

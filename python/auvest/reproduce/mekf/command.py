@@ -28,11 +28,13 @@ from auvest.reproduce.mekf import claims, measure, page
 
 
 def _shown(result: measure.Reproduction) -> Iterator[Table]:
-    yield table(
-        "Claims and targets",
-        ("where", "claim", "measured", ""),
-        [(one.where, one.claim, one.measured, one.verdict) for one in claims.claims(result)],
-    )
+    judged = claims.claims(result)
+    for title, own in (("Claims of the paper", False), ("Targets of this project", True)):
+        yield table(
+            title,
+            ("where", "claim", "measured", ""),
+            [(one.where, one.claim, one.measured, one.verdict) for one in judged if one.own == own],
+        )
     yield table(
         "RMSE / m over contamination",
         ("outliers", *measure.KERNELS),

@@ -8,31 +8,37 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from auvest import plots
+from auvest.plots import FILTER_COLOURS, KERNEL_COLOURS
 from auvest.reproduce.mekf.measure import KERNELS, LABELS, Reproduction
 
-COLOURS = {"ekf": plots.GREEN, "igg": plots.BLUE, "huber": plots.ORANGE, "hampel": plots.VERMILION}
 #: Steps of the track that Fig 5 shows: there and back twice.
 _SHOWN = 2400
 
 
 def tracks(result: Reproduction) -> Figure:
-    """Draw Fig 5: tracks of slave and leaders, and the errors of one run along them."""
+    """Draw Fig 5: tracks of slave and leaders, and the errors of one run across and along them."""
     over = result.over_time
     shown = slice(0, _SHOWN)
-    figure = plots.new_figure((11.0, 5.2), "Fig. 5: tracks, 5 % of the ranges at 10 sigma")
-    fleet, zoom = figure.subplots(1, 2)
-    for panel in (fleet, zoom):
-        panel.plot(*over.slave[shown].T, color=plots.BLACK, label="slave", linewidth=1.0)
-        for name, error in over.errors.items():
-            place = over.slave[shown] + error[shown]
-            panel.plot(*place.T, color=COLOURS[name], label=LABELS[name], linewidth=0.9)
-        plots.style_plane(panel)
+    figure = plots.new_figure((8.4, 5.0), "Fig. 5: tracks, 5 % of the ranges at 10 sigma")
+    grid = figure.add_gridspec(2, 2, width_ratios=(1.0, 1.5))
+    fleet = figure.add_subplot(grid[:, 0])
+    fleet.plot(*over.slave[shown].T, color=plots.BLACK, label="slave", linewidth=1.2)
     for i, style in enumerate(("--", ":")):
         fleet.plot(*over.leaders[shown, i].T, style, color=plots.GREY, label=f"leader {i + 1}")
-    middle = over.slave[min(_SHOWN, len(over.slave)) // 8]
-    zoom.set_xlim(middle[0] - 30, middle[0] + 30)
-    zoom.set_ylim(middle[1] - 15, middle[1] + 15)
-    plots.legend_below(figure, fleet, columns=5)
+    plots.style_plane(fleet)
+    hours = np.arange(1, 1 + len(over.slave[shown])) / 3600.0  # steps of 1 s
+    panels = figure.add_subplot(grid[0, 1]), figure.add_subplot(grid[1, 1])
+    for name, error in over.errors.items():
+        ways = plots.off_track(over.slave[shown], over.slave[shown] + error[shown])
+        for panel, off in zip(panels, ways, strict=True):
+            panel.plot(hours, off, color=KERNEL_COLOURS[name], label=LABELS[name], linewidth=0.9)
+    for panel, way in zip(panels, ("across", "along"), strict=True):
+        panel.axhline(0.0, color=plots.BLACK, linewidth=0.8, zorder=1)
+        plots.style(panel, ylabel=f"{way} the track, one run / m")
+    panels[0].tick_params(labelbottom=False)
+    panels[1].set_xlabel("time / h")
+    plots.legend_below(figure, panels[0], columns=4)
+    plots.legend_inside(fleet)
     return figure
 
 
@@ -40,12 +46,12 @@ def error_over_time(result: Reproduction) -> Figure:
     """Draw Fig 6: error over time of both filters, and the improvement."""
     over = result.over_time
     figure = plots.new_figure(
-        (9.0, 6.0), f"Fig. 6: position error over time, RMS of {result.runs} runs"
+        (8.4, 5.6), f"Fig. 6: position error over time, RMS of {result.runs} runs"
     )
     error, gain = figure.subplots(2, 1, sharex=True)
     for name, rms in over.rms_m.items():
-        error.plot(over.time_h, rms, color=COLOURS[name], label=LABELS[name])
-    gain.plot(over.time_h, 100 * over.improvement, color=COLOURS["igg"])
+        error.plot(over.time_h, rms, color=KERNEL_COLOURS[name], label=LABELS[name])
+    gain.plot(over.time_h, 100 * over.improvement, color=KERNEL_COLOURS["igg"])
     gain.axhline(
         30, color=plots.BLACK, linestyle="--", linewidth=0.9, label="the paper: about 30 %"
     )
@@ -56,7 +62,7 @@ def error_over_time(result: Reproduction) -> Figure:
 
 def kernels(result: Reproduction) -> Figure:
     """Draw the RMSE of every kernel over the share of outliers, and by timing and world."""
-    figure = plots.new_figure((12.0, 5.0), "RMSE of the kernels")
+    figure = plots.new_figure((8.4, 4.6), "RMSE of the kernels")
     over, bars = figure.subplots(1, 2, width_ratios=(2, 3))
     for name in KERNELS:
         points = [
@@ -66,14 +72,22 @@ def kernels(result: Reproduction) -> Figure:
         ]
         x, y, spread = (np.array(values) for values in zip(*points, strict=True))
         over.errorbar(
-            x, y, 1.96 * spread, color=COLOURS[name], label=LABELS[name], marker="o", markersize=4
+            x,
+            y,
+            1.96 * spread,
+            color=KERNEL_COLOURS[name],
+            label=LABELS[name],
+            marker="o",
+            markersize=4,
         )
     plots.style(over, xlabel="outliers at 10 sigma / %", ylabel="RMSE / m", ylim=(0, None))
     cases = {**{f"timing {k}": row for k, row in result.timing.items()}, **result.worlds}
     place = np.arange(len(cases))
     for i, name in enumerate(KERNELS):
         heights = [row[name].rmse_m for row in cases.values()]
-        bars.barh(place + 0.2 * (i - 1.5), heights, 0.18, color=COLOURS[name], label=LABELS[name])
+        bars.barh(
+            place + 0.2 * (i - 1.5), heights, 0.18, color=KERNEL_COLOURS[name], label=LABELS[name]
+        )
     bars.set_yticks(place, list(cases), fontsize=8)
     bars.invert_yaxis()
     plots.style(bars, xlabel="RMSE / m")
@@ -83,7 +97,7 @@ def kernels(result: Reproduction) -> Figure:
 
 def consistency(result: Reproduction) -> Figure:
     """Draw means of NEES and NIS over their expectation, with the 95 % bounds."""
-    figure = plots.new_figure((10.0, 5.0), "Consistency: right and wrong Q and R")
+    figure = plots.new_figure((8.4, 4.6), "Consistency: right and wrong Q and R")
     factors = list(dict.fromkeys((j.q_factor, j.r_factor) for j in result.consistency))
     filters = list(dict.fromkeys(j.filter for j in result.consistency))
     panels = figure.subplots(1, 2, sharey=True)
@@ -95,7 +109,14 @@ def consistency(result: Reproduction) -> Figure:
             x = np.arange(len(rows)) + 0.16 * (i - 1.5)
             bound = [(c.high - c.low) / 2 / m for c, m in zip(judged, middle, strict=True)]
             panel.errorbar(x, np.ones(len(rows)), bound, fmt="none", color=plots.GREY, capsize=3)
-            panel.plot(x, [c.mean for c in judged] / middle, "o", markersize=4, label=LABELS[name])
+            panel.plot(
+                x,
+                [c.mean for c in judged] / middle,
+                "o",
+                color={**FILTER_COLOURS, **KERNEL_COLOURS}[name],
+                markersize=4,
+                label=LABELS[name],
+            )
         names = [f"Q x {q:g}, R x {r:g}" for q, r in factors]
         panel.set_xticks(np.arange(len(factors)), names, rotation=20, fontsize=8)
         panel.set_yscale("log")

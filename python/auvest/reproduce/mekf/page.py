@@ -14,12 +14,14 @@ _KERNEL_NAMES = [measure.LABELS[name] for name in measure.KERNELS]
 
 def page(result: measure.Reproduction) -> str:
     """Return the page."""
+    judged = claims(result)
     worlds = {**{f"timing {kind}": row for kind, row in result.timing.items()}, **result.worlds}
     return markdown.page(
         __name__,
         result=result,
         measure=measure,
-        claims=rows((c.where, c.claim, c.measured, c.verdict) for c in claims(result)),
+        claims=rows((c.where, c.claim, c.measured, c.verdict) for c in judged if not c.own),
+        targets=rows((c.claim, c.measured, c.verdict) for c in judged if c.own),
         contamination=table(
             ("outliers", *_KERNEL_NAMES),
             [

@@ -11,8 +11,7 @@ from auvest.reproduce.mrclam6.measure import NAMES, Reproduction, Track
 
 _COLOURS = {
     "dead_reckoning": plots.GREY,
-    "ekf_slat": plots.BLUE,
-    "slatf2": plots.VERMILION,
+    **{name: plots.SLAT_COLOURS[name] for name in ("ekf_slat", "slatf2")},
 }
 _PANELS = 6
 

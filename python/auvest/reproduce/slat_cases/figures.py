@@ -14,12 +14,7 @@ from auvest.reproduce.slat_cases.measure import CROSSING_FILTERS, MEET_S, PAPER_
 
 def _crossing_figure(cases: Cases) -> Figure:
     curves = cases.curves
-    colours = {
-        "told": plots.GREY,
-        "ekf_slat": plots.GREEN,
-        "slatf2": plots.BLUE,
-        "slatf_joint": plots.ORANGE,
-    }
+    colours = {"told": plots.GREY, **plots.SLAT_COLOURS}
     sonar = cases.results["crossing"][0]
     figure = plots.new_figure(
         (11.0, 4.6),

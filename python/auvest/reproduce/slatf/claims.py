@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from auvest.reproduce.claims import Claim, Claims, graded
+from auvest.reproduce.claims import Claim, Claims, graded, settled
 from auvest.reproduce.estimate import Estimate, all_below_zero
 from auvest.reproduce.slatf.measure import (
     BEST_LEVEL,
@@ -29,7 +29,7 @@ _claim = Claims(__name__, Claim)
 
 def claims(result: Reproduction) -> list[Claim]:
     """Every claim that the paper's text makes about the simulation, judged."""
-    return [
+    judged = [
         _dead_reckoning(result),
         _beaten(result, "slatf1"),
         _beaten(result, "slatf2"),
@@ -41,6 +41,7 @@ def claims(result: Reproduction) -> list[Claim]:
         _values(result, "slatf2"),
         _best(result),
     ]
+    return settled(judged, result.runs)
 
 
 def _dead_reckoning(result: Reproduction) -> Claim:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 
+import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from auvest import plots
+from auvest.plots import SLAT_COLOURS
+from auvest.reproduce.estimate import Floats
 from auvest.reproduce.slatf.measure import (
     DEAF,
     FIG3_LEVELS,
@@ -17,18 +21,9 @@ from auvest.reproduce.slatf.measure import (
     Reproduction,
     tables,
 )
-from auvest.simulation.paper_slatf import FILTERS, LEVELS, FilterName
+from auvest.simulation.paper_slatf import FILTERS, LEVELS, FilterName, Level
 
-#: One colour per filter, the same in every figure.
-COLOURS: Mapping[FilterName, str] = {
-    "dr": plots.BLACK,
-    "dr_compensated": plots.GREY,
-    "slatf1": plots.VERMILION,
-    "slatf2": plots.BLUE,
-    "slatf_joint": plots.ORANGE,
-    "ekf_slat": plots.GREEN,
-}
-_MARKERS: Mapping[FilterName, str] = dict(zip(COLOURS, "os^DPv", strict=True))
+_MARKERS: Mapping[FilterName, str] = dict(zip(FILTERS, "os^DPv", strict=True))
 
 
 def _tracks(result: Reproduction) -> Figure:
@@ -41,6 +36,51 @@ def _tracks(result: Reproduction) -> Figure:
     plots.style(axes, xlabel="x / m", ylabel="y / m", aspect="equal")
     plots.legend_below(figure, axes, columns=2)
     return figure
+
+
+def _table1(result: Reproduction) -> Figure:
+    """Draw our RMSE at the levels of Table 1 with two standard errors, and what it prints."""
+    columns = tables(result)["table1"]
+    figure, axes = plots.new_axes(
+        (6.6, 4.6), f"Table 1: RMSE, {result.runs} runs, and the paper's values"
+    )
+    for i, (name, text) in enumerate(FILTERS.items()):
+        place = columns["level"] + 0.11 * (i - (len(FILTERS) - 1) / 2)
+        axes.errorbar(
+            place,
+            columns[f"{name}_rmse_m"],
+            2 * columns[f"{name}_rmse_se_m"],
+            fmt=_MARKERS[name],
+            color=SLAT_COLOURS[name],
+            markersize=5,
+            capsize=2,
+            label=text,
+        )
+        printed = columns.get(f"{name}_paper_rmse_m")
+        if printed is not None:
+            _mark_paper(axes, place, printed, name)
+    axes.plot([], [], "_", color=plots.BLACK, markersize=14, markeredgewidth=2, label="the paper's")
+    levels = [LEVELS[int(n) - 1] for n in columns["level"]]
+    axes.set_xticks(columns["level"], _named(levels))
+    plots.style(
+        axes,
+        xlabel="noise level; range, bearing in rad",
+        ylabel="RMSE, ± 2 standard errors / m",
+        ylim=(0, None),
+    )
+    plots.legend_below(figure, axes, columns=3)
+    return figure
+
+
+def _mark_paper(axes: Axes, places: Floats, values: Floats, name: FilterName) -> None:
+    """Mark what the paper prints of a filter."""
+    axes.plot(
+        places, values, "_", color=SLAT_COLOURS[name], markersize=14, markeredgewidth=2, zorder=4
+    )
+
+
+def _named(levels: Iterable[Level]) -> list[str]:
+    return [f"{one.number}\n{one.sigma_range_m:g} m, {one.sigma_bearing_rad:g}" for one in levels]
 
 
 def _over_levels(
@@ -57,21 +97,21 @@ def _over_levels(
     figure = plots.new_figure((6.6, 5.6), title)
     top, bottom = figure.subplots(2, 1, sharex=True)
     places = range(len(numbers))
+    levels = [LEVELS[n - 1] for n in numbers]
     for axes, (column, label) in ((top, upper), (bottom, lower)):
         for name, text in FILTERS.items():
             axes.plot(
                 places,
                 columns[f"{name}_{column}"],
                 marker=_MARKERS[name],
-                color=COLOURS[name],
+                color=SLAT_COLOURS[name],
                 label=text,
             )
+            if column == "rmse_m":
+                printed = [(one.paper or {}).get(name, np.nan) for one in levels]
+                _mark_paper(axes, np.arange(float(len(numbers))), np.array(printed), name)
         plots.style(axes, ylabel=label, ylim=(0, None))
-    levels = [LEVELS[n - 1] for n in numbers]
-    bottom.set_xticks(
-        list(places),
-        [f"{one.number}\n{one.sigma_range_m:g} m, {one.sigma_bearing_rad:g}" for one in levels],
-    )
+    bottom.set_xticks(list(places), _named(levels))
     bottom.set_xlabel("noise level; range, bearing in rad")
     plots.legend_below(figure, top, columns=3)
     return figure
@@ -88,7 +128,7 @@ def _over_time(result: Reproduction, *, stem: str, numbers: tuple[int, ...], tit
             curves = [(f"level{n}_", line, f"{text}, level {n}") for n, line in lines]
         for level, line, label in curves:
             error = columns[f"{name}_{level}rms_error_m"]
-            axes.plot(time_s, error, line, color=COLOURS[name], linewidth=1.5, label=label)
+            axes.plot(time_s, error, line, color=SLAT_COLOURS[name], linewidth=1.5, label=label)
     ylabel = "position error, rms over the runs / m"
     plots.style(axes, xlabel="time / s", ylabel=ylabel, ylim=(0, None))
     plots.legend_below(figure, axes, columns=2)
@@ -97,6 +137,7 @@ def _over_time(result: Reproduction, *, stem: str, numbers: tuple[int, ...], tit
 
 #: What is drawn, by the stem of the file.
 FIGURES: Mapping[str, Callable[[Reproduction], Figure]] = {
+    "table1": _table1,
     "fig02": _tracks,
     "fig03": partial(
         _over_levels,
@@ -118,6 +159,6 @@ FIGURES: Mapping[str, Callable[[Reproduction], Figure]] = {
         numbers=FIG6_LEVELS,
         upper=("rmse_m", "RMSE / m"),
         lower=("mean_error_m", "mean error / m"),
-        title="Fig. 6: precise sonar, noise falling to the right",
+        title="Fig. 6: precise sonar, noise falling to the right; dashes: Table 1 of the paper",
     ),
 }

@@ -257,13 +257,14 @@ FIG6_LEVELS = (5, 3, 6, 4, 7)
 
 
 def tables(result: Reproduction) -> dict[str, dict[str, Floats]]:
-    """Make the numbers of Figs 2 to 6, columns by name."""
+    """Make the numbers of Figs 2 to 6 and of Table 1, columns by name."""
     return {
         "fig02": _tracks(result),
         "fig03": _over_levels(result, FIG3_LEVELS),
         "fig04": _over_time(result, FIG4_LEVELS),
         "fig05": _over_time(result, FIG5_LEVELS),
         "fig06": _over_levels(result, FIG6_LEVELS),
+        "table1": _table1(result),
     }
 
 
@@ -286,6 +287,20 @@ def _over_levels(result: Reproduction, numbers: tuple[int, ...]) -> dict[str, Fl
         columns[f"{name}_rmse_m"] = np.array([rmse(one).value for one in row])
         columns[f"{name}_mean_error_m"] = np.array([mean_error(one) for one in row])
         columns[f"{name}_error_variance_m2"] = np.array([error_variance(one) for one in row])
+    return columns
+
+
+def _table1(result: Reproduction) -> dict[str, Floats]:
+    """Give our RMSE with its standard error, and the paper's, at its levels."""
+    levels = [level for level in LEVELS if level.paper]
+    columns = {"level": np.array([level.number for level in levels], float)}
+    for name in FILTERS:
+        ours = [rmse(result.levels[level.number][name]) for level in levels]
+        columns[f"{name}_rmse_m"] = np.array([one.value for one in ours])
+        columns[f"{name}_rmse_se_m"] = np.array([one.standard_error for one in ours])
+        paper = [(level.paper or {}).get(name, np.nan) for level in levels]
+        if not np.isnan(paper).all():
+            columns[f"{name}_paper_rmse_m"] = np.array(paper)
     return columns
 
 
