@@ -12,7 +12,7 @@ PAGES = {
         "tutorials/own_model",
         "tutorials/own_log",
         "tutorials/monte_carlo",
-        "firmware",
+        "Three beacons on a MEGA <firmware>",
         "tutorials/paper_to_chip",
     ],
     "Guides": [
@@ -25,18 +25,18 @@ PAGES = {
         "models",
         "logs",
         "importers",
-        "/firmware/README",
+        "On a microcontroller </firmware/README>",
     ],
     "Algorithms": [
-        "algorithms/ukf",
-        "algorithms/aukf",
-        "algorithms/mekf",
-        "algorithms/unknown_start",
-        "algorithms/smoother",
-        "algorithms/slatf",
-        "algorithms/vehicle",
-        "algorithms/guidance",
-        "algorithms/math",
+        "Unscented filter <algorithms/ukf>",
+        "AUKF: when to sample <algorithms/aukf>",
+        "M-estimation EKF <algorithms/mekf>",
+        "Unknown start <algorithms/unknown_start>",
+        "Smoother <algorithms/smoother>",
+        "SLATF <algorithms/slatf>",
+        "The hull <algorithms/vehicle>",
+        "Guidance and control <algorithms/guidance>",
+        "Functions and random numbers <algorithms/math>",
     ],
     "Reproductions": ["reproduction/index"],
     "Reference": [
@@ -51,7 +51,7 @@ PAGES = {
         "speed_vehicle",
         "speed_startup",
     ],
-    "Project": ["contributing", "/CHANGELOG", "/README"],
+    "Project": ["contributing", "/CHANGELOG", "Readme </README>"],
 }
 
 
