@@ -75,7 +75,7 @@ def test_own_protocol_on_the_board(build_sketch, board, sketches, page):
     assert error_m[20:].max() < 1.5  # 3 sigma of one range
     assert (found[20:, 2] < 60).all()
     # Ranges and what the sketch answers are those that the page shows.
-    shown = dict(re.findall(r"^ +(R,\S+) +-> +(P,\S+)", page, re.MULTILINE))
+    shown = dict(re.findall(r"^(R,\S+) +-> +(P,\S+)", page, re.MULTILINE))
     assert len(shown) == 6
     assert shown.items() <= answers.items(), answers
 
