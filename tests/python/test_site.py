@@ -11,6 +11,7 @@ import zlib
 from html import unescape
 from html.parser import HTMLParser
 from pathlib import Path
+from types import SimpleNamespace
 from urllib.parse import unquote, urlsplit
 
 import pytest
@@ -199,6 +200,30 @@ def test_a_tutorial_runs_its_blocks_in_order(tmp_path: Path) -> None:
     assert re.search(r"head -1\s*6\s", text)
     assert re.search(r"7 \+ 1\)\)\s*43\s", text)
     assert html.count('src="data:image/png;base64,') == 2
+
+
+def test_the_page_of_the_firmware_is_part_of_the_site_where_it_was_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(str(CONFIGURATION))
+    import navigation
+
+    app = SimpleNamespace(
+        srcdir=tmp_path, outdir=tmp_path / "site", builder=SimpleNamespace(format="html")
+    )
+    app.outdir.mkdir()
+    home = (ROOT / "docs" / "index.md").read_text()
+    for made in (False, True):
+        if made:
+            (tmp_path / "dist").mkdir()
+            (tmp_path / "dist" / "page.html").write_text("the page")
+        source = [home]
+        navigation.add_contents(app, "docs/index", source)
+        navigation.add_entrance(app, None)
+        assert ('href="../page.html"' in source[0]) is made
+        assert (app.outdir / "page.html").exists() is made
+        assert "## Begin here" in source[0]
+        assert "url=docs/index.html" in (app.outdir / "index.html").read_text()
 
 
 def test_what_is_broken_ends_the_build_and_is_said_where_it_is(tmp_path: Path) -> None:
