@@ -48,7 +48,7 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "none"  # the docstrings have them
 autodoc_class_signature = "mixed"
 napoleon_google_docstring = False
-napoleon_use_ivar = True
+napoleon_custom_sections = [("Attributes", "params_style")]
 
 copybutton_exclude = ".linenos, .gp, .go"
 highlight_language = "none"
