@@ -7,6 +7,7 @@ have. What the pages lack for that is in the modules beside this file:
 
     formulas     LaTeX to HTML by KaTeX when the site is built: pages need no script for it
     executed     runs the code of the tutorials and puts in what it prints and draws
+    notebooks    the tutorials to take along, for Jupyter
     headers      the C++ interface, from the headers and their comments
     navigation   the order of the pages, which no Markdown page has to carry
     excerpts     search results with their text from disk, too, where a page may not fetch another
@@ -29,6 +30,7 @@ extensions = [
     "sphinx_copybutton",
     "formulas",
     "executed",
+    "notebooks",
     "headers",
     "navigation",
     "excerpts",

@@ -185,7 +185,7 @@ def test_tutorials_show_what_their_code_has_printed(site: Path, page: Path) -> N
 
 def test_a_tutorial_runs_its_blocks_in_order(tmp_path: Path) -> None:
     page = (
-        "# Page\n\n<!-- file: sub/numbers.txt -->\n```text\n6\n7\n```\n\n"
+        "# Page\n\nIt is [here](#page).\n\n<!-- file: sub/numbers.txt -->\n```text\n6\n7\n```\n\n"
         "```python\na, b = map(int, open('sub/numbers.txt'))\na * b\n```\n\n"
         "```python\nimport matplotlib.pyplot as plt\nplt.plot([a, b])\n"
         "plt.savefig('kept.png')\n```\n\n"
@@ -200,6 +200,18 @@ def test_a_tutorial_runs_its_blocks_in_order(tmp_path: Path) -> None:
     assert re.search(r"head -1\s*6\s", text)
     assert re.search(r"7 \+ 1\)\)\s*43\s", text)
     assert html.count('src="data:image/png;base64,') == 2
+    # The same as a notebook: what runs are cells, and nothing else is.
+    notebook = json.loads((built / "docs/tutorials/page.ipynb").read_text())
+    cells = [cell["source"] for cell in notebook["cells"] if cell["cell_type"] == "code"]
+    assert cells == [
+        "%%writefile sub/numbers.txt\n6\n7",
+        "a, b = map(int, open('sub/numbers.txt'))\na * b",
+        "import matplotlib.pyplot as plt\nplt.plot([a, b])\nplt.savefig('kept.png')",
+        "!cat sub/numbers.txt | head -1\n!echo $((6 * \\\n  7 + 1))",
+    ]
+    texts = [cell["source"] for cell in notebook["cells"] if cell["cell_type"] == "markdown"]
+    assert texts == ["# Page\n\nIt is here.", "```python\n1 / 0\n```"]
+    assert 'href="page.ipynb"' in html
 
 
 def test_the_page_of_the_firmware_is_part_of_the_site_where_it_was_made(
