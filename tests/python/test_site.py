@@ -276,6 +276,15 @@ def test_formulas_within_a_line_are_those_that_github_shows_too() -> None:
                 assert "|" not in formula, f"{page}: {formula}"
 
 
+def test_the_guide_and_the_readme_have_one_table_of_filters() -> None:
+    tables = []
+    for page in (ROOT / "README.md", ROOT / "docs" / "guides" / "which_filter.md"):
+        table = re.search(r"^\| I have \| take .*?\n\n", page.read_text(), re.MULTILINE | re.DOTALL)
+        assert table is not None
+        tables.append(re.sub(r"\]\(.*?\)", "]", table[0]))
+    assert tables[0] == tables[1]
+
+
 def test_every_name_of_the_interfaces_is_documented(site: Path) -> None:
     inventory = zlib.decompress((site / "objects.inv").read_bytes().split(b"\n", 4)[4]).decode()
     names = {line.split()[0] for line in inventory.splitlines()}
