@@ -7,6 +7,7 @@ have. What the pages lack for that is in the modules beside this file:
 
     formulas     LaTeX to HTML by KaTeX when the site is built: pages need no script for it
     executed     runs the code of the tutorials and puts in what it prints and draws
+    notebooks    the tutorials to take along, for Jupyter
     headers      the C++ interface, from the headers and their comments
     navigation   the order of the pages, which no Markdown page has to carry
     excerpts     search results with their text from disk, too, where a page may not fetch another
@@ -16,7 +17,6 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
-ROOT = Path(__file__).resolve().parents[2]
 
 project = "auvest"
 author = "The auvest authors"
@@ -29,6 +29,7 @@ extensions = [
     "sphinx_copybutton",
     "formulas",
     "executed",
+    "notebooks",
     "headers",
     "navigation",
     "excerpts",
@@ -48,7 +49,7 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "none"  # the docstrings have them
 autodoc_class_signature = "mixed"
 napoleon_google_docstring = False
-napoleon_use_ivar = True
+napoleon_custom_sections = [("Attributes", "params_style")]
 
 copybutton_exclude = ".linenos, .gp, .go"
 highlight_language = "none"

@@ -1,7 +1,12 @@
-"""The order of the pages: put behind the front page as tables of contents that it does not show."""
+"""The order of the pages: put behind the front page as tables of contents that it does not show.
+
+The page where the firmware runs (`make page` writes dist/page.html) becomes part of the site where
+it is there, and the front page then leads to it.
+"""
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 from sphinx.application import Sphinx
@@ -12,7 +17,7 @@ PAGES = {
         "tutorials/own_model",
         "tutorials/own_log",
         "tutorials/monte_carlo",
-        "firmware",
+        "Three beacons on a MEGA <firmware>",
         "tutorials/paper_to_chip",
     ],
     "Guides": [
@@ -25,18 +30,18 @@ PAGES = {
         "models",
         "logs",
         "importers",
-        "/firmware/README",
+        "On a microcontroller </firmware/README>",
     ],
     "Algorithms": [
-        "algorithms/ukf",
-        "algorithms/aukf",
-        "algorithms/mekf",
-        "algorithms/unknown_start",
-        "algorithms/smoother",
-        "algorithms/slatf",
-        "algorithms/vehicle",
-        "algorithms/guidance",
-        "algorithms/math",
+        "Unscented filter <algorithms/ukf>",
+        "AUKF: when to sample <algorithms/aukf>",
+        "M-estimation EKF <algorithms/mekf>",
+        "Unknown start <algorithms/unknown_start>",
+        "Smoother <algorithms/smoother>",
+        "SLATF <algorithms/slatf>",
+        "The hull <algorithms/vehicle>",
+        "Guidance and control <algorithms/guidance>",
+        "Functions and random numbers <algorithms/math>",
     ],
     "Reproductions": ["reproduction/index"],
     "Reference": [
@@ -51,13 +56,22 @@ PAGES = {
         "speed_vehicle",
         "speed_startup",
     ],
-    "Project": ["contributing", "/CHANGELOG", "/README"],
+    "Project": ["contributing", "/CHANGELOG", "Readme </README>"],
 }
+
+FIRMWARE = """\
+<p class="firmware"><a href="../page.html">See the firmware run in this browser</a>: the sketches'
+machine code on a simulated ATmega2560.</p>
+
+## Begin here
+"""
 
 
 def add_contents(app: Sphinx, name: str, source: list[str]) -> None:
     """Append the tables of contents to the pages that have them."""
     if name == "docs/index":
+        if firmware_page(app).exists():
+            source[0] = source[0].replace("## Begin here\n", FIRMWARE)
         for caption, pages in PAGES.items():
             source[0] += contents(pages, f":hidden:\n:caption: {caption}")
     if name == "docs/reproduction/index":
@@ -75,9 +89,16 @@ def contents(pages: list[str], options: str) -> str:
     return "\n\n```{toctree}\n" + options + "\n\n" + "\n".join(pages) + "\n```\n"
 
 
+def firmware_page(app: Sphinx) -> Path:
+    """Return where `make page` writes."""
+    return Path(app.srcdir) / "dist" / "page.html"
+
+
 def add_entrance(app: Sphinx, error: Exception | None) -> None:
-    """Lead from the site's folder to its front page."""
+    """Lead from the site's folder to its front page; bring the firmware's page."""
     if app.builder.format == "html" and error is None:
+        if firmware_page(app).exists():
+            shutil.copy(firmware_page(app), app.outdir)
         (Path(app.outdir) / "index.html").write_text(
             '<!doctype html><meta charset="utf-8"><title>auvest</title>'
             '<meta http-equiv="refresh" content="0; url=docs/index.html">'

@@ -11,6 +11,7 @@ import zlib
 from html import unescape
 from html.parser import HTMLParser
 from pathlib import Path
+from types import SimpleNamespace
 from urllib.parse import unquote, urlsplit
 
 import pytest
@@ -184,7 +185,7 @@ def test_tutorials_show_what_their_code_has_printed(site: Path, page: Path) -> N
 
 def test_a_tutorial_runs_its_blocks_in_order(tmp_path: Path) -> None:
     page = (
-        "# Page\n\n<!-- file: sub/numbers.txt -->\n```text\n6\n7\n```\n\n"
+        "# Page\n\nIt is [here](#page).\n\n<!-- file: sub/numbers.txt -->\n```text\n6\n7\n```\n\n"
         "```python\na, b = map(int, open('sub/numbers.txt'))\na * b\n```\n\n"
         "```python\nimport matplotlib.pyplot as plt\nplt.plot([a, b])\n"
         "plt.savefig('kept.png')\n```\n\n"
@@ -199,6 +200,42 @@ def test_a_tutorial_runs_its_blocks_in_order(tmp_path: Path) -> None:
     assert re.search(r"head -1\s*6\s", text)
     assert re.search(r"7 \+ 1\)\)\s*43\s", text)
     assert html.count('src="data:image/png;base64,') == 2
+    # The same as a notebook: what runs are cells, and nothing else is.
+    notebook = json.loads((built / "docs/tutorials/page.ipynb").read_text())
+    cells = [cell["source"] for cell in notebook["cells"] if cell["cell_type"] == "code"]
+    assert cells == [
+        "%%writefile sub/numbers.txt\n6\n7",
+        "a, b = map(int, open('sub/numbers.txt'))\na * b",
+        "import matplotlib.pyplot as plt\nplt.plot([a, b])\nplt.savefig('kept.png')",
+        "!cat sub/numbers.txt | head -1\n!echo $((6 * \\\n  7 + 1))",
+    ]
+    texts = [cell["source"] for cell in notebook["cells"] if cell["cell_type"] == "markdown"]
+    assert texts == ["# Page\n\nIt is here.", "```python\n1 / 0\n```"]
+    assert 'href="page.ipynb"' in html
+
+
+def test_the_page_of_the_firmware_is_part_of_the_site_where_it_was_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(str(CONFIGURATION))
+    import navigation
+
+    app = SimpleNamespace(
+        srcdir=tmp_path, outdir=tmp_path / "site", builder=SimpleNamespace(format="html")
+    )
+    app.outdir.mkdir()
+    home = (ROOT / "docs" / "index.md").read_text()
+    for made in (False, True):
+        if made:
+            (tmp_path / "dist").mkdir()
+            (tmp_path / "dist" / "page.html").write_text("the page")
+        source = [home]
+        navigation.add_contents(app, "docs/index", source)
+        navigation.add_entrance(app, None)
+        assert ('href="../page.html"' in source[0]) is made
+        assert (app.outdir / "page.html").exists() is made
+        assert "## Begin here" in source[0]
+        assert "url=docs/index.html" in (app.outdir / "index.html").read_text()
 
 
 def test_what_is_broken_ends_the_build_and_is_said_where_it_is(tmp_path: Path) -> None:
@@ -223,8 +260,12 @@ def test_what_is_broken_ends_the_build_and_is_said_where_it_is(tmp_path: Path) -
 
 
 def test_formulas_within_a_line_are_those_that_github_shows_too() -> None:
-    """GitHub takes a backslash before a punctuation mark for Markdown's own, and `|` for a cell."""
+    """GitHub takes a backslash before a punctuation mark for Markdown's own, and `|` for a cell.
+
+    And it refuses `operatorname`, there and in blocks.
+    """
     for page in (ROOT / "docs").rglob("*.md"):
+        assert "operatorname" not in page.read_text(), page
         text = re.sub(
             r"^```.*?^```$|`[^`\n]*`", "", page.read_text(), flags=re.DOTALL | re.MULTILINE
         )
@@ -233,6 +274,15 @@ def test_formulas_within_a_line_are_those_that_github_shows_too() -> None:
         for row in re.findall(r"^\|.*\|$", text, re.MULTILINE):
             for formula in re.findall(r"\$([^$]+)\$", row):
                 assert "|" not in formula, f"{page}: {formula}"
+
+
+def test_the_guide_and_the_readme_have_one_table_of_filters() -> None:
+    tables = []
+    for page in (ROOT / "README.md", ROOT / "docs" / "guides" / "which_filter.md"):
+        table = re.search(r"^\| I have \| take .*?\n\n", page.read_text(), re.MULTILINE | re.DOTALL)
+        assert table is not None
+        tables.append(re.sub(r"\]\(.*?\)", "]", table[0]))
+    assert tables[0] == tables[1]
 
 
 def test_every_name_of_the_interfaces_is_documented(site: Path) -> None:
