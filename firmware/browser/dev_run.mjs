@@ -1,0 +1,14 @@
+import { World } from "./world.mjs";
+import { Tracking } from "./tracking.mjs";
+import { Mission } from "./mission.mjs";
+import { readFileSync } from "node:fs";
+const [kind, file, policy, until, ...sets] = process.argv.slice(2);
+const program = readFileSync("/work/wt/page/build/page/" + file + ".bin");
+const run = new (kind === "tracking" ? Tracking : Mission)(new World(), program, Number(policy), 1);
+run.set({ noise: 1, outliers: 0, wander: 0, current: 0.3, towards: 1, ...JSON.parse(sets[0] ?? "{}") });
+const c = process.cpuUsage();
+while (!run.done && run.chip.time < Number(until)) run.chip.run(run.chip.time + 0.1);
+const cpu = process.cpuUsage(c).user / 1e6;
+console.log(run.lines.slice(0, 3).join("\n"), "\n", run.lines.slice(-2).join("\n"));
+console.log(run.rows.slice(-1)[0]);
+console.log(run.chip.time, "s simulated", cpu, "s cpu", (run.chip.time / cpu).toFixed(1), "x; awake", 1 - run.chip.asleep / run.chip.cpu.cycles, run.tally);
