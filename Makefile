@@ -89,7 +89,7 @@ $(VENV)/.auvest-editable: $(VENV)/.auvest-setup-dev $(CORE_FILES)
 
 # ---- Use -----------------------------------------------------------------------------------------
 
-.PHONY: demo reproduce wheel library
+.PHONY: demo reproduce wheel library page
 demo: install ## install and run the first two simulations: tables and the paths of figures
 	$(VENV)/bin/auvest simulate aukf
 	$(VENV)/bin/auvest simulate slatf
@@ -105,6 +105,9 @@ wheel: $(VENV)/.auvest-build-requires ## a wheel of the package in dist/
 
 library: install ## the Arduino library: a zip in dist/
 	mkdir -p dist && $(VENV)/bin/auvest library --output dist
+
+page: install-editable ## the page where the firmware runs: dist/page.html
+	$(PY) -m firmware.browser.build
 
 # The simulated board, and the sketch tracking_loop compiled for it.
 .PHONY: board capture

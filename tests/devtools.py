@@ -76,6 +76,7 @@ class Tab:
         os.close(self._from)
 
     _session: str | None = None
+    _loaded = False
 
     def call(self, method: str, session: str | None = "own", **params: Any) -> Any:
         """Call a method of DevTools."""
@@ -92,8 +93,11 @@ class Tab:
                 return answer["result"]
 
     def open(self, url: str) -> None:
-        """Go to a page."""
+        """Go to a page, and wait until it has loaded."""
+        self._loaded = False
         self.call("Page.navigate", url=url)
+        while not self._loaded:
+            self._read()
 
     def resize(self, width: int, height: int, *, phone: bool = False) -> None:
         """Give the page another size."""
@@ -133,6 +137,7 @@ class Tab:
         line, _, self._waiting = self._waiting.partition(b"\0")
         message: dict[str, Any] = json.loads(line)
         method, params = message.get("method"), message.get("params", {})
+        self._loaded = self._loaded or method == "Page.loadEventFired"
         if method == "Network.requestWillBeSent":
             self.requests.append(params["request"]["url"])
         if method == "Runtime.exceptionThrown":

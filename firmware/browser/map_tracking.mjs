@@ -5,7 +5,7 @@ import { View } from "./view.mjs";
 const STATION = [0.2, 2]; // [m], RangeBearing's
 const LENGTH = 60; // of a run [s]
 const SHOWN = 40; // estimates with their ellipses
-const SPAN = 9; // [m]
+const SPAN = 4.5; // [m]
 
 /** Constant acceleration from the start, as in the paper. */
 function desired(time) {
@@ -22,7 +22,7 @@ export function drawTracking(canvas, rows) {
   const now = rows.at(-1) ?? { x: STATION[0], y: STATION[1], time: 0 };
   const { pen, width, height } = canvas;
   const sigma = Math.sqrt((now.P00_m2 ?? 0) + (now.P11_m2 ?? 0));
-  const view = new View(canvas, now.x, now.y, Math.min(40, Math.max(SPAN, 12 * sigma)));
+  const view = new View(canvas, now.x, now.y, Math.min(40, Math.max(SPAN, 14 * sigma)));
   view.grid();
   view.line(TRACK, COLOURS.track, 1.5, [7, 6]);
   const recent = rows.slice(-SHOWN);
@@ -38,6 +38,8 @@ export function drawTracking(canvas, rows) {
     pen.globalAlpha = 1;
   });
   view.line(rows.map(({ x, y }) => [x, y]), COLOURS.truth, 2);
+  const before = rows.at(-2) ?? { x: now.x - 1, y: now.y - 2 };
+  view.vehicle(now.x, now.y, Math.atan2(now.x - before.x, now.y - before.y), COLOURS.truth);
   view.line(recent.map(({ x_m, y_m }) => [x_m, y_m]), COLOURS.estimate, 1.2);
   recent.forEach(({ x_m, y_m, P00_m2, P10_m2, P11_m2 }, i) => {
     const last = i === recent.length - 1;
@@ -46,8 +48,6 @@ export function drawTracking(canvas, rows) {
     pen.globalAlpha = 1;
     view.dot(x_m, y_m, last ? 4 : 2, COLOURS.estimate);
   });
-  const before = rows.at(-2) ?? { x: now.x - 1, y: now.y - 2 };
-  view.vehicle(now.x, now.y, Math.atan2(now.x - before.x, now.y - before.y), COLOURS.truth);
   if (rows.length > 0) view.line([STATION, measured(now)], "#93adbf55", 1, [2, 5]);
   overview({ pen, width, height }, now);
 }

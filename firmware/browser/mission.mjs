@@ -26,6 +26,7 @@ export class Mission {
     this.done = false;
     this.columns = new Columns("MISSION");
     this.sample = 0;
+    this.row = null; // of the sample
     this.requested = 0; // when the sample was asked for [s]
     this.held = FROM_REST; // the command that acts
     this.command = null; // of the sample
@@ -87,7 +88,7 @@ export class Mission {
     world.calls.mission_look();
     const [x, y, , , , yaw, north, east] = world.numbers;
     const fix = fixed ? { x: range * Math.cos(bearing), y: range * Math.sin(bearing) } : null;
-    this.rows.push({ time: (sample - 1) * PERIOD, x, y, yaw, north, east, fix });
+    this.row = { time: (sample - 1) * PERIOD, x, y, yaw, north, east, fix };
   }
 
   steer(sample, fields, time) {
@@ -103,6 +104,7 @@ export class Mission {
   /** The world moves on by a period: the command before acts until the new one has come. */
   advance() {
     if (this.sample === 0) return;
+    this.rows.push(this.row);
     const end = this.sample * PERIOD;
     const command = this.command ?? this.held;
     const delay = this.command === null ? PERIOD : this.delay;
@@ -125,9 +127,8 @@ export class Mission {
     });
     const shown = { leg: row.leg, mode: row.mode, status: row.status, fixes: row.fixes };
     for (const name of COMPARED) shown[name] = row[name] === null ? NaN : floatOf(row[name]);
-    shown.rudder_rad = floatOf(this.held[0]);
-    // Of the sample that the line is about, the last that was pushed, or the one before.
-    Object.assign(this.rows.at(-1), { told: shown });
+    shown.rudder_rad = floatOf(this.command[0]);
+    this.row.told = shown; // its line ends before the next sample begins
     this.done = row.mode === FINISHED;
   }
 }

@@ -91,10 +91,10 @@ export class View {
     pen.stroke();
   }
 
-  /** A torpedo of this length [px] at least; the course is from north, clockwise [rad]. */
+  /** A torpedo; the course is from north, clockwise [rad]. */
   vehicle(east, north, course, colour, rudder = 0) {
     const { pen } = this;
-    const length = Math.max(22, 1.6 * this.scale);
+    const length = 30;
     pen.save();
     pen.translate(this.x(east), this.y(north));
     pen.rotate(course);
@@ -102,12 +102,12 @@ export class View {
     pen.shadowBlur = 14;
     pen.fillStyle = colour;
     pen.beginPath();
-    pen.roundRect(-length / 8, -length / 2, length / 4, length, length / 8);
+    pen.roundRect(-3.5, -length / 2, 7, length, 3.5);
     pen.fill();
     pen.shadowBlur = 0;
-    pen.translate(0, length / 2);
+    pen.translate(0, length / 2 - 2);
     pen.rotate(rudder);
-    pen.fillRect(-length / 40 - 0.5, 0, length / 20 + 1, length / 4);
+    pen.fillRect(-1.2, 0, 2.4, 10);
     pen.restore();
   }
 }
