@@ -97,7 +97,7 @@ $(VENV)/.auvest-editable: $(VENV)/.auvest-setup-dev $(CORE_FILES)
 
 # ---- Use -----------------------------------------------------------------------------------------
 
-.PHONY: demo reproduce docs wheel library release
+.PHONY: demo reproduce docs wheel library page release
 demo: install ## install and run the first two simulations: tables and the paths of figures
 	$(VENV)/bin/auvest simulate aukf
 	$(VENV)/bin/auvest simulate slatf
@@ -119,14 +119,16 @@ wheel: $(VENV)/.auvest-build-requires ## a wheel of the package in dist/
 library: install ## the Arduino library: a zip in dist/
 	mkdir -p dist && $(VENV)/bin/auvest library --output dist
 
+page: install-editable ## the page where the firmware runs: dist/page.html
+	$(PY) -m firmware.browser.build
+
 # All of them are made anew, so that nothing older is among the checksums. Wheels for further Pythons,
 # each compiled from nothing: make release PYTHONS="python3.12 python3.13"
-RELEASE_PARTS := wheel library $(shell sed -nE 's/^(docs|page):.*/\1/p' Makefile)
 PYTHONS :=
 release: $(VENV)/.auvest-release ## all that is published, in dist/: wheel, sdist, library, checksums
 	rm -rf dist
 	$(PY) -m build --sdist --no-isolation --outdir dist .
-	$(MAKE) $(RELEASE_PARTS)
+	$(MAKE) wheel library page docs
 	for python in $(PYTHONS); do \
 	    $$python -m pip wheel --quiet --no-deps --wheel-dir dist dist/auvest-*.tar.gz; \
 	done
