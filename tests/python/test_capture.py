@@ -434,8 +434,8 @@ def test_a_board_that_restarts_begins_a_section(port: PortWithBoard, tmp_path: P
     seventh = {"checkpoint": 7, "least_age_s": 1.5, "most_age_s": 75.0}
     assert values["resumptions"] == [{"section": 1, **none}, {"section": 2, **seventh}]
     table = capture._table({k: math.nan if v is None else v for k, v in values.items()}, "")
-    assert "1 of 2" in list(table.columns[1].cells)
-    assert "the last from 1.5 to 75 s old" in list(table.columns[2].cells)
+    cells = [str(cell) for column in table.columns for cell in column.cells]
+    assert {"1 of 2", "the last from 1.5 to 75 s old"} <= set(cells)
     assert "the board restarted after 1.5 s" in plain(result.stderr)
     assert values["damaged_lines"] == 1  # sample 3 came twice
     assert values["missed"] == 2  # one in each of the first two sections
