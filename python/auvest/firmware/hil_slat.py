@@ -153,7 +153,7 @@ class SlatRecord:
     @property
     def echoes(self) -> int:
         """Most echoes at one time, at least 1."""
-        return max(1, *(len(row.z) for row in self.rows if isinstance(row, Step)))
+        return max([1, *(len(row.z) for row in self.rows if isinstance(row, Step))])
 
     @property
     def particles(self) -> int:
