@@ -438,7 +438,22 @@ CALLS = {
     "run station": (
         lambda f: f.run(Z, dt=0.5, sensor=1),
         TypeError,
-        "sensor must be a name, a model or a sequence of names, one per row",
+        "sensor must be a name, a model or a sequence of these, one per row",
+    ),
+    "run sensor set": (
+        lambda f: f.run(Z, dt=0.5, sensor={"RangeBearing"}),
+        TypeError,
+        "sensor must be a name, a model or a sequence of these, one per row",
+    ),
+    "run sensor numbers": (
+        lambda f: f.run(Z, dt=0.5, sensor=["RangeBearing"] * 7 + [0]),
+        TypeError,
+        "sensor must be a name, a model or a sequence of these, one per row",
+    ),
+    "run sensor none": (
+        lambda f: f.run(Z, dt=0.5, sensor=[]),
+        TypeError,
+        "sensor must be a name, a model or a sequence of these, one per row",
     ),
     "run sensor name": (
         lambda f: f.run(Z, dt=0.5, sensor=["RangeBearing"] * 7 + ["Sonar"]),

@@ -206,6 +206,20 @@ def test_run_is_its_single_steps(kind, name, dtype, late_s):
     assert not any(result.too_late) if late_s > 0 else "too_late" not in result.columns
 
 
+@pytest.mark.parametrize(("kind", "name", "dtype"), PRECISE_CASES)
+def test_a_record_names_its_sensors_or_has_a_model_in_each_row(kind, name, dtype):
+    rows = record(ALL[name])
+    a, b, c = (make(kind, name, dtype) for _ in range(3))
+    named = rows.run(a)
+    models = [b.sensors[one] for one in rows.sensor]
+    by_model = dataclasses.replace(rows, sensor=models).run(b)
+    mixed = dataclasses.replace(rows, sensor=[*models[:3], *rows.sensor[3:]]).run(c)
+    for column in named.columns:
+        assert same_bits(by_model[column], named[column]), column
+        assert same_bits(mixed[column], named[column]), column
+    assert everything(a) == everything(b) == everything(c)
+
+
 @pytest.mark.parametrize(("kind", "name", "dtype"), RANGING_CASES)
 def test_an_unknown_start_is_run_and_saved_as_any(kind, name, dtype):
     """Row by row, as a record, and through a saved state in the middle of several components."""

@@ -36,21 +36,21 @@ UNICYCLE = {
 }
 MAKE: dict[str, Callable[..., Any]] = {
     "slatf1": lambda x, p, **o: auvest.Slatf(
-        x, p, version=1, particles=37, gate=16, resample_below=0.9, **o
+        x, p, version=1, particles=37, resample_below=0.9, **{"gate": 16, **o}
     ),
     "slatf2": lambda x, p, **o: auvest.Slatf(x, p, particles=37, resampling="residual", **o),
     "slatf_imm": lambda x, p, **o: auvest.Slatf(x, p, particles=20, master=auvest.Imm(), **o),
     "births": lambda x, p, **o: auvest.Slatf(
-        x, p, particles=20, gate=16, birth_velocity_m_s=2, **o
+        x, p, particles=20, birth_velocity_m_s=2, **{"gate": 16, **o}
     ),
     "joint1": lambda x, p, **o: auvest.SlatfJoint(x, p, particles=20, **o),
     "joint2": lambda x, p, **o: auvest.SlatfJoint(
-        x, p, particles=20, max_masters=2, kept=0, gate=0, **o
+        x, p, particles=20, max_masters=2, kept=0, **{"gate": 0, **o}
     ),
     "shared": lambda x, p, **o: auvest.SlatfJoint(
-        x, p, particles=20, covariance="shared", max_masters=2, gate=0, **o
+        x, p, particles=20, covariance="shared", max_masters=2, **{"gate": 0, **o}
     ),
-    "ekf": lambda x, p, **o: auvest.EkfSlat(x, p, gate=16, **o),
+    "ekf": lambda x, p, **o: auvest.EkfSlat(x, p, **{"gate": 16, **o}),
     "ekf_imm": lambda x, p, **o: auvest.EkfSlat(x, p, master=auvest.Imm(), **o),
     "reckoning": lambda x, p, **o: auvest.DeadReckoning(x, p, **o),
 }
@@ -404,6 +404,23 @@ def test_a_covariance_that_is_none_is_refused_wherever_the_filter_keeps_it(name:
         assert np.isfinite(other.x).all(), place
         assert np.isfinite(other.P).all(), place
     assert refused > 0
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+@pytest.mark.parametrize("name", [name for name in NAMES if name not in ("births", "reckoning")])
+def test_a_filter_takes_its_own_state_whatever_it_was_told(name: str, dtype: str) -> None:
+    # Without a gate an absurd echo throws a master: 1e9 m off in 2 s is some 1e9 m/s.
+    filter_ = make(name, dtype, gate=0)
+    filter_.add_master([100, 50, 1, 1, 0, 0], np.eye(6))
+    filter_.predict(2.0, [1.0, 0.0])
+    with contextlib.suppress(auvest.FilterError), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        filter_.update([1e9, 1.479], 0)
+    assert np.abs(filter_.master(0)[0][2:4]).max() > 1e7
+    state = filter_.save()
+    other = make(name, dtype, gate=0)
+    other.restore(state)
+    assert other.save() == state
 
 
 def test_the_status_is_pickled() -> None:

@@ -508,7 +508,7 @@ class GaussianFilter:
         *,
         dt: npt.ArrayLike | None = None,
         input: npt.ArrayLike | None = None,
-        sensor: str | MeasurementModel | Sequence[str] | None = None,
+        sensor: str | MeasurementModel | Sequence[str | MeasurementModel] | None = None,
         place: npt.ArrayLike | None = None,
         age_s: npt.ArrayLike | None = None,
         reference: npt.ArrayLike | None = None,
@@ -528,9 +528,9 @@ class GaussianFilter:
             sampled at them.
         input : array_like, shape (T, k)
             What drove the process in each of these times, as for :meth:`predict`.
-        sensor : str or MeasurementModel, or sequence of str, length T
-            What measured: one for all rows, or one of ``sensors`` per row; needed where the filter
-            has several.
+        sensor : str or MeasurementModel, or sequence of these, length T
+            What measured: one for all rows, or one per row, a name in ``sensors`` or a model;
+            needed where the filter has several.
         place : array_like, shape (T, p), optional
             What ``sensor.place`` names, at each row: where the station or the leader stood, m, how
             the instrument was headed, rad; a NaN row, and default: as the model has it.
@@ -585,7 +585,7 @@ class GaussianFilter:
         *,
         dt: npt.ArrayLike | None = None,
         input: npt.ArrayLike | None = None,
-        sensor: str | MeasurementModel | Sequence[str] | None = None,
+        sensor: str | MeasurementModel | Sequence[str | MeasurementModel] | None = None,
         place: npt.ArrayLike | None = None,
         age_s: npt.ArrayLike | None = None,
         reference: npt.ArrayLike | None = None,
@@ -715,7 +715,7 @@ class GaussianFilter:
         row: int,
         partial: RunResult,
         record: dict[str, Any],
-        sensor: str | MeasurementModel | Sequence[str] | None,
+        sensor: str | MeasurementModel | Sequence[str | MeasurementModel] | None,
         *,
         given_dt: bool,
     ) -> NoReturn:
@@ -725,7 +725,7 @@ class GaussianFilter:
             status,
             dt=record["dt"][row] if given_dt else None,
             z=record["z"][row],
-            sensor=sensor if which is None else np.asarray(sensor)[row].item(),
+            sensor=sensor if which is None else list(sensor)[row],  # type: ignore[arg-type]
             place=None if place is None else place[row],
         )
         error = FilterError(action, status, step=row, partial=partial, hint=hint)
@@ -740,7 +740,7 @@ class GaussianFilter:
         z: npt.ArrayLike,
         dt: npt.ArrayLike | None,
         input: npt.ArrayLike | None,
-        sensor: str | MeasurementModel | Sequence[str] | None,
+        sensor: str | MeasurementModel | Sequence[str | MeasurementModel] | None,
         place: npt.ArrayLike | None,
         age_s: npt.ArrayLike | None,
         reference: npt.ArrayLike | None,
@@ -983,18 +983,23 @@ class GaussianFilter:
             )
 
     def _as_sensor_rows(
-        self, sensor: str | MeasurementModel | Sequence[str] | None
+        self, sensor: str | MeasurementModel | Sequence[str | MeasurementModel] | None
     ) -> tuple[list[Any], npt.NDArray[np.int32] | None]:
         """Give the core's sensors and, where there are several, which of them each row has."""
         if sensor is None or isinstance(sensor, (str, MeasurementModel)):
             return [self._handle(sensor)], None
-        names = np.asarray(sensor)
-        if names.ndim != 1 or names.dtype.kind not in "UO":
-            raise TypeError("sensor must be a name, a model or a sequence of names, one per row")
-        used = list(dict.fromkeys(names.tolist()))
-        handles = [self._handle(name) for name in used]
-        index = {name: k for k, name in enumerate(used)}
-        return handles, np.array([index[name] for name in names.tolist()], np.int32)
+        given = sensor if isinstance(sensor, (list, tuple)) else np.asarray(sensor).tolist()
+        if not (
+            given
+            and isinstance(given, (list, tuple))
+            and all(isinstance(one, (str, MeasurementModel)) for one in given)
+        ):
+            raise TypeError("sensor must be a name, a model or a sequence of these, one per row")
+        keys = [one if isinstance(one, str) else id(one) for one in given]
+        used = dict(zip(keys, given, strict=True))
+        index = {key: k for k, key in enumerate(used)}
+        handles = [self._handle(one) for one in used.values()]
+        return handles, np.array([index[key] for key in keys], np.int32)
 
     def _as_measurements(
         self, z: npt.ArrayLike, handles: list[Any], which: npt.NDArray[np.int32] | None

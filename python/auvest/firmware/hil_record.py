@@ -196,16 +196,22 @@ class _Heard:
     ) -> None:
         if self._start is None:
             self._start = in_float32(filter_)
-        model = rows.get("sensor") or next(iter(filter_.sensors.values()))
-        key = json.dumps(describe(model))
-        self._sensors.setdefault(key, model)
-        which = list(self._sensors).index(key)
+        given = rows.get("sensor") or next(iter(filter_.sensors.values()))
+        models = given if isinstance(given, list) else [given] * len(z)
+        numbers = {id(model): self._number(model) for model in models}
+        which = np.array([numbers[id(model)] for model in models], int)
         z = np.reshape(z, (len(z), -1))
         driven = rows.get("input", np.empty((len(z), 0)))
         place = rows.get("place", np.empty((len(z), 0)))
         age = rows.get("age_s", np.zeros(len(z)))
-        self._parts.append((np.full(len(z), which), rows["dt"], z, driven, place, age))
+        self._parts.append((which, rows["dt"], z, driven, place, age))
         self._count += len(z)
+
+    def _number(self, model: MeasurementModel) -> int:
+        """Give the number of a model, the same for equal ones."""
+        key = json.dumps(describe(model))
+        self._sensors.setdefault(key, model)
+        return list(self._sensors).index(key)
 
     def record(self) -> Record:
         if self._start is None:

@@ -284,42 +284,28 @@ class Replay(ABC):
 
     def _fused(
         self, fused: Measured, bare: Rows, after: npt.NDArray[np.intp], **rows: Rows
-    ) -> tuple[dict[str, npt.NDArray[Any]], list[RunResult]]:
-        """Take rows through the filter: what updates reported, and results.
+    ) -> tuple[dict[str, npt.NDArray[Any]], RunResult]:
+        """Take rows through the filter: what updates reported, and the result.
 
         ``bare`` are the times of rows without measurement, ``after`` says behind how many of them
-        each measurement has its row; ``rows`` are columns of all. One call per stretch of one
-        sensor with one noise; a row without a measurement goes with the next that has one.
+        each measurement has its row; ``rows`` are columns of all.
         """
         nothing = np.full((len(bare), 3), np.nan)
         z = np.insert(nothing, after, fused.z, axis=0)
         place = np.insert(nothing, after, fused.place, axis=0)
-        ages = np.insert(np.zeros(len(bare)), after, fused.time_s - fused.taken_s)
-        of_row = np.insert(np.full(len(bare), -1), after, np.arange(len(fused)))
-        kinds = np.column_stack([fused.sensor, fused.noise])
-        models, model_of = _distinct(kinds)
-        there = np.flatnonzero(of_row >= 0)
-        if len(there):
-            following = np.searchsorted(there, np.arange(len(z)))
-            which = model_of[of_row[there[np.minimum(following, len(there) - 1)]]]
-        else:
-            which = np.zeros(len(z), int)
-        results = []
-        for part in np.split(np.arange(len(z)), np.flatnonzero(np.diff(which)) + 1):
-            if len(models):
-                kind = models[which[part[0]]]
-                sensor = self.instruments.model(int(kind[0]), kind[1:])
-            else:
-                sensor = next(iter(self._filter.sensors.values()))
-            options: dict[str, Any] = {name: values[part] for name, values in rows.items()}
-            size = _places(sensor)
-            if size:
-                options["place"] = place[part, :size]
-            if self._late_s > 0:
-                options["age_s"] = ages[part]
-            numbers = z[part, : len(sensor.measures)]
-            results.append(self._run_rows(self._filter, numbers, sensor=sensor, **options))
-        return updates_of(results), results
+        if self._late_s > 0:
+            rows["age_s"] = np.insert(np.zeros(len(bare)), after, fused.time_s - fused.taken_s)
+        kinds, kind_of = _distinct(np.column_stack([fused.sensor, fused.noise]))
+        models = [self.instruments.model(int(kind[0]), kind[1:]) for kind in kinds]
+        models = models or [next(iter(self._filter.sensors.values()))]
+        which = np.insert(np.zeros(len(bare), np.intp), after, kind_of)
+        size = max(map(_places, models))
+        if size:
+            rows["place"] = place[:, :size]
+        numbers = z[:, : max(len(model.measures) for model in models)]
+        sensor = models[0] if len(models) == 1 else [models[k] for k in which.tolist()]
+        result = self._run_rows(self._filter, numbers, sensor=sensor, **rows)
+        return updates_of(result), result
 
     def _move_on(self, at: Rows, states: Floats, spreads: Floats) -> None:
         """Make the last of these states the present; remember what a latency may still ask for."""
@@ -478,12 +464,10 @@ class Localiser(Replay):
         if len(time):
             motion = np.insert(np.column_stack([chord.real, chord.imag, turn]), after, 0.0, axis=0)
             steps = np.insert(np.diff(bounds), after, 0.0)
-            updates, results = self._fused(fused, times, after, dt=steps, input=motion)
-            x = np.concatenate([result.x for result in results])
-            covariance = np.concatenate([result.P for result in results])
+            updates, result = self._fused(fused, times, after, dt=steps, input=motion)
+            x, covariance = result.x, result.P
             if self._filter.components > 1:
-                for name in tables.MIXTURE:
-                    mixture[name] = np.concatenate([getattr(result, name) for result in results])
+                mixture = {name: getattr(result, name) for name in tables.MIXTURE}
             _fill(columns, np.flatnonzero(used), updates)
             measured = np.insert(np.zeros(len(times), bool), after, True)
             ranged = fused.sensor == tables.RANGE
@@ -755,11 +739,9 @@ class Tracker(Replay):
         after = np.searchsorted(bare, fused.time_s, side="right")
         time = np.insert(bare, after, fused.time_s)
         steps = np.diff(time, prepend=self._now)
-        updates, results = self._fused(fused, bare, after, dt=steps)
+        updates, result = self._fused(fused, bare, after, dt=steps)
         _fill(columns, of_table, updates)
-        x = np.concatenate([result.x for result in results])
-        covariance = np.concatenate([result.P for result in results])
-        return time, x, covariance
+        return time, result.x, result.P
 
     def _sample(
         self,
@@ -925,27 +907,20 @@ def interval_policy(settings: IntervalSettings) -> IntervalPolicy:
     return CovarianceBudget(position_sigma_m=settings.position_sigma_m, **limits)
 
 
-def updates_of(results: list[RunResult]) -> dict[str, npt.NDArray[Any]]:
-    """Gather what the updates in these results reported, a row per measurement.
+def updates_of(result: RunResult) -> dict[str, npt.NDArray[Any]]:
+    """Gather what the updates in a result reported, a row per measurement.
 
     Behind the numbers of smaller measurements there is NaN.
     """
-    columns: dict[str, npt.NDArray[Any]] = {}
-    there = np.concatenate([~np.isnan(result.nis) for result in results])
-    size = max(result.innovation.shape[1] for result in results)
-    for name in ("innovation", "weight"):
-        columns[name] = np.concatenate([_widened(getattr(one, name), size) for one in results])
-    spread = [np.sqrt(np.diagonal(one.S, axis1=1, axis2=2)) for one in results if one.S is not None]
-    columns["sigma"] = np.concatenate([_widened(one, size) for one in spread])
-    for name in ("nis", "near_field", "decision", "recovered"):
-        columns[name] = np.concatenate([getattr(result, name) for result in results])
-    return {name: values[there] for name, values in columns.items()}
+    there = ~np.isnan(result.nis)
+    columns = {name: getattr(result, name)[there] for name in _REPORTED}
+    assert result.S is not None
+    columns["sigma"] = np.sqrt(np.diagonal(result.S[there], axis1=1, axis2=2))
+    return columns
 
 
-def _widened(rows: Rows, size: int) -> Rows:
-    if rows.shape[1] == size:
-        return rows
-    return np.pad(rows, ((0, 0), (0, size - rows.shape[1])), constant_values=np.nan)
+#: What updates report, beside the sigmas of their innovations.
+_REPORTED = ("innovation", "weight", "nis", "near_field", "decision", "recovered")
 
 
 def _fill(

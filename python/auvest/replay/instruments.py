@@ -33,6 +33,8 @@ from auvest.replay.sources import Sources
 _TOO_SHORT = 5.0
 #: Standard deviation (m/s) of a vertical velocity that is not measured: none is known.
 _UNMEASURED_M_S = 1e3
+#: Models that are kept: making one in the core costs more than a hundred steps with it.
+_REMEMBERED = 256
 
 
 @dataclass(frozen=True)
@@ -166,6 +168,7 @@ class Instruments:
         self._spatial = spatial
         self._sources = sources
         self._levelled = not spatial and "depth.csv" in log
+        self._models: dict[tuple[int, bytes], MeasurementModel] = {}
         self.depths = Depths()
         self.source_depths = Sources(
             {source: (depth, 0.0) for source, (_, _, depth) in log.stations().items()},
@@ -203,7 +206,15 @@ class Instruments:
         return self._per_source(rows, section, "latency_s")
 
     def model(self, sensor: int, noise: Rows) -> MeasurementModel:
-        """Give the model of a sensor with this noise."""
+        """Give the model of a sensor with this noise; the same one as long as it is remembered."""
+        key = (sensor, noise.tobytes())
+        if key not in self._models:
+            if len(self._models) == _REMEMBERED:
+                self._models.clear()
+            self._models[key] = self._made(sensor, noise)
+        return self._models[key]
+
+    def _made(self, sensor: int, noise: Rows) -> MeasurementModel:
         a, b, c = noise.tolist()
         fixes = self._settings.fixes
         if sensor == tables.RANGE:

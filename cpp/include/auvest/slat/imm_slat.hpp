@@ -111,11 +111,11 @@ struct MasterBank<Imm<Models...>, Lanes> {
   }
 
   /// Whether the numbers of one particle are those of a bank.
-  static bool is_sound(const Scalar* at) {
-    bool sound = is_belief<6>(at);
+  static bool is_sound(const Scalar* at, const Extent<Scalar>& first) {
+    bool sound = is_belief<6>(at, first);
     Scalar sum(0);
     for (int k = 0; k < kModes; ++k) {
-      sound = sound && is_belief<6>(at + (kModeField + k * kGaussian) * kBlock);
+      sound = sound && is_belief<6>(at + (kModeField + k * kGaussian) * kBlock, first);
       sum = sum + weight_of(at[(kWeightField + k) * kBlock]);
     }
     return sound && math::absolute(sum - Scalar(1)) < Scalar(1e-3);

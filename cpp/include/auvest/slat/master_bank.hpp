@@ -34,7 +34,9 @@ struct MasterBank {
   }
 
   /// Whether the numbers of one particle are those of a bank.
-  static bool is_sound(const Scalar* at) { return is_belief<6>(at); }
+  static bool is_sound(const Scalar* at, const Extent<Scalar>& first) {
+    return is_belief<6>(at, first);
+  }
 };
 
 }  // namespace AUVEST_INSTRUCTIONS

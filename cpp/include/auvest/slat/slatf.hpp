@@ -305,11 +305,12 @@ class Slatf : public SlatfFrame<
   /// Whether each particle has covariances, and probabilities of an Imm, which the mean over all
   /// does not show: to ask of a state that was put back.
   bool is_sound() const {
+    const Extent<Scalar> first = extent();
     bool sound = true;
     for (int i = 0; i < set_.size(); ++i) {
-      sound = sound && (!Proposal::kInformed || is_belief<kPose>(set_.at(i, kPoseField)));
+      sound = sound && (!Proposal::kInformed || is_belief<kPose>(set_.at(i, kPoseField), first));
       for (int n = 0; n < masters_; ++n) {
-        sound = sound && Particle::Bank::is_sound(set_.at(i, Particle::master_field(n)));
+        sound = sound && Particle::Bank::is_sound(set_.at(i, Particle::master_field(n)), first);
       }
     }
     return sound;
