@@ -67,7 +67,7 @@ class Record:
         filter_ = self.filter
         if filter_.dtype != np.float32:
             raise ValueError(f"the filter must be in float32, not in {filter_.dtype}")
-        columns = [self.sensor, self.dt, self.z, self.input, self.place]
+        columns: list[npt.NDArray[Any]] = [self.sensor, self.dt, self.z, self.input, self.place]
         if self.age is not None:
             columns.append(self.age)
             if filter_.late_s == 0:
