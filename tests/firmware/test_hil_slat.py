@@ -20,17 +20,10 @@ pytest_plugins = ["board_support"]
 
 RECORDS = {**all_records(), "slatf-shared": shared_record()}
 ON_CHIP = {**all_records(chip=True), "slatf-shared": shared_record()}
-#: Beside the bench itself the ATmega2560 has room for these many of the paper's particles.
-AVR_PARTICLES = 32
 
 
 def record_for(target, name):
-    if target != "atmega2560":
-        return RECORDS[name].for_bench()
-    record = ON_CHIP[name]
-    if record.kind in ("slatf1", "slatf2") and record.particles > AVR_PARTICLES:
-        record = replace(record, particles=AVR_PARTICLES)
-    return record.for_bench()
+    return (ON_CHIP if target == "atmega2560" else RECORDS)[name].for_bench()
 
 
 @pytest.fixture(scope="module")
