@@ -30,6 +30,64 @@ void bind_sonar(py::module_& m) {
            py::arg("params"), py::arg("bearing"));
 }
 
+/// What a filter is told in a run of the scenario, and the truth at its pings; the world's random
+/// numbers are those that `simulate` takes for that run.
+py::dict record_slat(const SlatScenario& scenario, std::uint64_t seed, std::uint64_t run) {
+  SlatScribe scribe;
+  std::vector<double> time, truth, masters;
+  math::Random world(seed, 2 * run);
+  math::Random unused(seed, 2 * run + 1);
+  require_ok(run_slat(scribe, Sonar<double>(), scenario, world, unused,
+                      [&](const SlatStep<SlatScribe>& step) {
+                        time.push_back(step.time_s);
+                        for (int i = 0; i < 2; ++i) truth.push_back(step.slave.position[i]);
+                        for (int n = 0; n < scenario.count; ++n) {
+                          for (int i = 0; i < 2; ++i) {
+                            masters.push_back(step.masters[n].position[i]);
+                          }
+                        }
+                      }));
+  const auto steps = static_cast<py::ssize_t>(scribe.steps.size());
+  const auto echoes = static_cast<py::ssize_t>(scribe.heard.size());
+  const py::ssize_t count = scenario.count;
+  py::array_t<double> u(std::vector<py::ssize_t>{steps, 2});
+  py::array_t<double> changes(std::vector<py::ssize_t>{steps, count, 2});
+  py::array_t<double> priors(std::vector<py::ssize_t>{count, 6});
+  py::array_t<double> z(std::vector<py::ssize_t>{echoes, 2});
+  py::array_t<std::int64_t> step(echoes), master(echoes);
+  for (py::ssize_t k = 0; k < steps; ++k) {
+    const SlatScribe::Step& one = scribe.steps[static_cast<std::size_t>(k)];
+    for (int i = 0; i < 2; ++i) {
+      u.mutable_at(k, i) = one.reading(i);
+      for (int n = 0; n < scenario.count; ++n) changes.mutable_at(k, n, i) = one.changes[n](i);
+    }
+  }
+  for (int n = 0; n < scenario.count; ++n) {
+    for (int i = 0; i < 6; ++i) {
+      priors.mutable_at(n, i) = scribe.priors[static_cast<std::size_t>(n)].x(i);
+    }
+  }
+  for (py::ssize_t k = 0; k < echoes; ++k) {
+    const SlatScribe::Heard& one = scribe.heard[static_cast<std::size_t>(k)];
+    step.mutable_at(k) = static_cast<std::int64_t>(one.step);
+    master.mutable_at(k) = one.echo.master;
+    for (int i = 0; i < 2; ++i) z.mutable_at(k, i) = one.echo.z(i);
+  }
+  py::dict result;
+  result["u"] = u;
+  result["changes"] = changes;
+  result["priors"] = priors;
+  result["step"] = step;
+  result["master"] = master;
+  result["z"] = z;
+  result["time_s"] = py::array_t<double>(static_cast<py::ssize_t>(time.size()), time.data());
+  result["truth"] =
+      py::array_t<double>({static_cast<py::ssize_t>(time.size()), py::ssize_t(2)}, truth.data());
+  result["masters"] = py::array_t<double>(
+      {static_cast<py::ssize_t>(time.size()), count, py::ssize_t(2)}, masters.data());
+  return result;
+}
+
 }  // namespace
 
 template <class Scalar, int Pose>
@@ -125,6 +183,9 @@ void bind_slat(py::module_& m) {
     result["masters"] = masters;
     return result;
   });
+
+  m.def("slat_record", &record_slat, py::arg("scenario"), py::arg("seed"), py::arg("run"),
+        "What a filter is told in a run of the scenario.");
 
   SlatBinder<CompassMotion<float>>::bind(m, "compass");
   SlatBinder<CompassMotion<double>>::bind(m, "compass");

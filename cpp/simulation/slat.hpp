@@ -6,7 +6,9 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "auvest/math/angle.hpp"
 #include "auvest/math/random.hpp"
@@ -195,5 +197,52 @@ inline Status run_slat(Filter& filter, Sonar<typename Filter::Scalar> sonar,
   }
   return Status::kOk;
 }
+
+/// Stands in for a filter and writes down all that it is told: the log of a run.
+struct SlatScribe {
+  using Scalar = double;
+  using SlaveBelief = Belief<double, 2>;
+  using MasterBelief = Belief<double, 6>;
+  using Control = Vector<double, 2>;
+  using VelocityChange = Vector<double, 2>;
+
+  struct Step {
+    double dt;
+    Control reading;
+    VelocityChange changes[SlatScenario::kMasters];  ///< zero where the plan is not known
+  };
+  struct Heard {
+    std::size_t step;  ///< at whose end, counted from 1
+    Echo<double> echo;
+  };
+
+  std::vector<MasterBelief> priors;
+  std::vector<Step> steps;
+  std::vector<Heard> heard;
+
+  Status reset(const SlaveBelief&, math::Random&) { return Status::kOk; }
+
+  Status add_master(const MasterBelief& prior) {
+    priors.push_back(prior);
+    return Status::kOk;
+  }
+
+  Status predict(double dt, const Control& reading, math::Random&, const VelocityChange* changes) {
+    Step step;
+    step.dt = dt;
+    step.reading = reading;
+    for (int n = 0; n < SlatScenario::kMasters; ++n) {
+      math::set_zero(step.changes[n]);
+      if (changes != nullptr && n < static_cast<int>(priors.size())) step.changes[n] = changes[n];
+    }
+    steps.push_back(step);
+    return Status::kOk;
+  }
+
+  Status update(const Echo<double>* echoes, int count, const Sonar<double>&, math::Random&) {
+    for (int k = 0; k < count; ++k) heard.push_back(Heard{steps.size(), echoes[k]});
+    return Status::kOk;
+  }
+};
 
 }  // namespace auvest

@@ -88,9 +88,9 @@ def chi2_bounds(dof: int, count: int = 1, level: float = 0.95) -> tuple[float, f
     if not 0 < as_number("level", level) < 1:
         raise ValueError(f"level must lie between 0 and 1, not {level}")
     tail = (1 - level) / 2
-    from scipy import stats  # here, because it is slow to import
+    from scipy.special import gammaincinv  # here, because it is slow to import
 
-    low, high = stats.chi2.ppf([tail, 1 - tail], dof * count) / count
+    low, high = 2 * gammaincinv(0.5 * dof * count, [tail, 1 - tail]) / count
     return float(low), float(high)
 
 

@@ -45,6 +45,10 @@ FILTER_COLOURS: Mapping[str, str] = {
     "aukf": BLUE,
     "robust-ekf": PURPLE,
     "robust-ukf": BROWN,
+    "slatf1": "#5B6FD6",
+    "slatf2": "#B5306B",
+    "slatf-joint": "#2E6B1F",
+    "ekf-slat": "#8A7000",
 }
 #: And one line style in pages, which tells them apart in greyscale: lengths of dashes and gaps in
 #: points; none for an unbroken line.
@@ -55,6 +59,10 @@ FILTER_DASHES: Mapping[str, tuple[float, ...]] = {
     "aukf": (5, 2, 1, 2, 1, 2),
     "robust-ekf": (),
     "robust-ukf": (12, 3),
+    "slatf1": (2, 2, 6, 2),
+    "slatf2": (14, 3, 2, 3),
+    "slatf-joint": (10, 4),
+    "ekf-slat": (6, 2, 2, 2, 2, 2),
 }
 _CYCLE = (BLUE, VERMILION, GREEN, ORANGE, SKY, GREY)
 

@@ -85,6 +85,7 @@ class Filter:
 
 _EVERYWHERE = {"chip": True, "parity": True, "budget": True}
 _IMM_TOO_LARGE = "with an Imm not on the ATmega2560: 16 particles take more than 7 of its 8 KB"
+_SLATF = {"replay": True, **_EVERYWHERE, "note": _IMM_TOO_LARGE}
 
 FILTERS: dict[str, Filter] = {
     name: Filter(name=name, cls=cls, title=title, family=family, **where)  # type: ignore[arg-type]
@@ -95,10 +96,10 @@ FILTERS: dict[str, Filter] = {
         ("aukf", "Aukf", "AUKF", "gaussian", {"replay": True, **_EVERYWHERE}),
         ("robust-ekf", "RobustEkf", "robust EKF", "gaussian", {"replay": True, **_EVERYWHERE}),
         ("robust-ukf", "RobustUkf", "robust UKF", "gaussian", {"replay": True, **_EVERYWHERE}),
-        ("slatf1", "Slatf", "SLATF 1.0", "slat", {**_EVERYWHERE, "note": _IMM_TOO_LARGE}),
-        ("slatf2", "Slatf", "SLATF 2.0", "slat", {**_EVERYWHERE, "note": _IMM_TOO_LARGE}),
-        ("slatf-joint", "SlatfJoint", "SLATF, joint", "slat", _EVERYWHERE),
-        ("ekf-slat", "EkfSlat", "EKF-SLAT", "slat", _EVERYWHERE),
+        ("slatf1", "Slatf", "SLATF 1.0", "slat", _SLATF),
+        ("slatf2", "Slatf", "SLATF 2.0", "slat", _SLATF),
+        ("slatf-joint", "SlatfJoint", "SLATF, joint", "slat", {"replay": True, **_EVERYWHERE}),
+        ("ekf-slat", "EkfSlat", "EKF-SLAT", "slat", {"replay": True, **_EVERYWHERE}),
         (
             "dead-reckoning", "DeadReckoning", "dead reckoning", "slat",
             {"note": "what the others are compared with"},

@@ -75,6 +75,22 @@ def recordings() -> dict[str, dict[str, bytes]]:
                 "robot,t,x,y,theta", [(r, *row) for r in robots for row in pose]
             ),
         },
+        "mrclam6_tracks": {
+            "sightings.csv": table(
+                "t,observer,subject,range,bearing", [(0.5 * t, 1, 2, 3, 0.1) for t in range(2, 60)]
+            ),
+            "odometry.csv": table("robot,t,v,w", [(r, *row) for r in robots for row in velocity]),
+            "groundtruth.csv": table(
+                "robot,t,x,y,theta",
+                [(r, 0.25 * t, t, r, 0.1) for r in robots for t in range(130)],
+            ),
+        },
+        "two_vehicles": {
+            "odometry.csv": table("t,v,w", velocity),
+            "sonar.csv": table("t,range,bearing", [(t, 30, 0.1 * t) for t in time]),
+            "groundtruth.csv": table("t,x,y,theta", pose),
+            "master.csv": table("t,x,y", [row[:3] for row in pose]),
+        },
         "mrclam": {
             name: b"# comment\n" + table("", rows).lstrip().replace(b",", b" ")
             for name, rows in spaced.items()

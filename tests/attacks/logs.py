@@ -23,7 +23,7 @@ import numpy as np
 
 from auvest.errors import FilterError
 from auvest.logs import LogError, LogFolder
-from auvest.registry import replayable
+from auvest.registry import FILTERS, replayable
 from auvest.replay import Settings, replay, settings_from
 from tests.attacks.damage import damaged, steps
 from tests.attacks.frame import Case, Failed, main
@@ -39,7 +39,8 @@ def logs() -> dict[str, dict[str, bytes]]:
     """Short logs: beacons, leaders that move, a target seen from a station; and with all columns.
 
     "sensors" has a DVL, a compass, depth, fixes and positions, "space" a USBL with what the craft
-    tells, "own" a user's files with a mapping, times in ISO 8601 and places on Earth.
+    tells, "own" a user's files with a mapping, times in ISO 8601 and places on Earth, "echoes" and
+    "headings" a slave and masters.
     """
     time = range(1, 25)
     odometry = table("time_s,forward_m,left_m,turn_rad", [(t, 1.0, 0.0, 0.02) for t in time])
@@ -109,6 +110,26 @@ def logs() -> dict[str, dict[str, bytes]]:
             "leaders.csv": table("time_s,source,x_m,y_m,sigma_m", leaders),
             **common,
         },
+        "echoes": {
+            "odometry.csv": speed,
+            "echoes.csv": table(
+                "time_s,source,range_m,bearing_rad",
+                [(t + 0.5, 4 + t % 2, 30 + 0.2 * t, 0.5 - 0.1 * t) for t in time],
+            ),
+            "masters.csv": table(
+                "time_s,source,x_m,y_m,vx_m_s,sigma_m", [(0, 4, 25, 20, 0.1, 2), (8, 6, 9, 9, 0, 1)]
+            ),
+            "master_truth.csv": table("time_s,source,x_m,y_m", [(t, 4, 25, 20) for t in time]),
+            **common,
+        },
+        "headings": {
+            "odometry.csv": table("time_s,speed_m_s,heading_rad", [(t, 1.0, 0.1) for t in time]),
+            "echoes.csv": table(
+                "time_s,range_m,azimuth_rad", [(t, 30 + 0.2 * t, 0.5 - 0.1 * t) for t in time]
+            ),
+            "plans.csv": table("time_s,source,ax_m_s2,ay_m_s2", [(5, 0, 0.1, 0), (9, 0, 0, 0)]),
+            **common,
+        },
         "tracking": {
             "fixes.csv": table("time_s,source,range_m,bearing_rad", fixes),
             "beacons.csv": table("source,x_m,y_m", [(0, 0, 0)]),
@@ -119,6 +140,10 @@ def logs() -> dict[str, dict[str, bytes]]:
 
 #: How each is read and replayed; the others with the defaults.
 SETTINGS = {
+    "echoes": settings_from(
+        {"slat": {"particles": 20, "max_masters": 3}, "slave": {"mean_s": 0.3}}
+    ),
+    "headings": settings_from({"slat": {"particles": 20}}),
     "sensors": settings_from({"ranges": {"latency_s": 1.5, "sources": {"2": {"latency_s": 0.25}}}}),
     "space": settings_from({"fixes": {"latency_s": 2.0}, "log": {"frame": "ned"}}),
     "own": settings_from(
@@ -154,7 +179,9 @@ class Logs:
 
     def case(self, rng: random.Random) -> Case:
         kind = rng.choice(list(logs()))
-        return Case((kind, rng.choice(replayable())), steps(rng, list(logs()[kind])))
+        family = "slat" if "echoes.csv" in logs()[kind] else "gaussian"
+        fitting = [name for name in replayable() if FILTERS[name].family == family]
+        return Case((kind, rng.choice(fitting)), steps(rng, list(logs()[kind])))
 
     def text(self, case: Case) -> str:
         kind, name = case.subject

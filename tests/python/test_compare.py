@@ -54,7 +54,7 @@ def test_what_it_writes(compared: tuple[Path, dict[str, Any]]) -> None:
     assert json.loads((made / "results.json").read_text()) == told
     for name in FILTERS:
         tables = {path.name for path in (made / name).iterdir()}
-        assert {"estimates.parquet", "measurements.csv", "trajectory.tum"} <= tables
+        assert {"estimates.parquet", "measurements.parquet", "trajectory.tum"} <= tables
 
 
 def test_one_page_has_all_tracks(compared: tuple[Path, dict[str, Any]], tmp_path: Path) -> None:

@@ -56,8 +56,8 @@ def test_every_filter_that_claims_a_budget_has_a_row() -> None:
 def test_an_unknown_name_is_refused_with_those_that_exist() -> None:
     with pytest.raises(ValueError, match=r"filter must be ekf, ukf, ckf, aukf, .* not 'kf'"):
         filter_named("kf")
-    with pytest.raises(ValueError, match="not 'slatf1'"):
-        filter_named("slatf1", replayable())
+    with pytest.raises(ValueError, match="not 'dead-reckoning'"):
+        filter_named("dead-reckoning", replayable())
 
 
 def test_the_command_prints_the_registry() -> None:

@@ -160,14 +160,14 @@ def test_figures_files_and_report_have_both_tracks(tmp_path: Path) -> None:
     numbers = json.loads(done.stdout)["logs"][0]
     assert numbers["smoothed"]["lag_s"] == 5.0
     folder = tmp_path / "out/far"
-    errors = pa_csv.read_csv(folder / "errors.csv").to_pydict()
+    errors = pa_parquet.read_table(folder / "errors.parquet").to_pydict()
     for key, prefix in (("rmse_m", ""), ("smoothed", "smoothed_")):
         x, y = (np.array(errors[f"{prefix}error_{axis}_m"]) for axis in "xy")
         found = numbers[key] if key == "rmse_m" else numbers["smoothed"]["rmse_m"]
         assert found == pytest.approx(math.sqrt(np.mean(x * x + y * y)))
     assert numbers["smoothed"]["rmse_m"] < numbers["rmse_m"]
     assert numbers["smoothed"]["max_error_m"] == pytest.approx(np.hypot(x, y).max())
-    estimates = pa_csv.read_csv(folder / "estimates.csv").to_pydict()
+    estimates = pa_parquet.read_table(folder / "estimates.parquet").to_pydict()
     tum = np.loadtxt(folder / "smoothed.tum")
     np.testing.assert_allclose(tum[:, 1], estimates["smoothed_x_m"], rtol=1e-12)
     np.testing.assert_allclose(tum[:, 2], estimates["smoothed_y_m"], rtol=1e-12)

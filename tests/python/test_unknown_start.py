@@ -8,6 +8,7 @@ import pickle
 from dataclasses import replace
 
 import numpy as np
+import pyarrow.parquet as parquet
 import pytest
 from filter_support import DTYPES, same_bits
 
@@ -397,12 +398,12 @@ def test_a_replay_finds_its_start_and_says_when(tmp_path):
     assert result.numbers["rmse_m"] > 10.0
     said = dict(rows(result))
     assert said["start"].startswith("settled first at ")
-    header, *lines = (tmp_path / "estimates.csv").read_text().splitlines()
-    assert header.endswith('"convergence","mixture_size"')
-    assert lines[0].endswith('"not converged",1')
-    assert lines[-1].endswith('"settled",1')
-    x, y = (float(number) for number in lines[-1].split(",")[1:3])
-    assert np.hypot(x - truth[-1, 0], y - truth[-1, 1]) < 1.0
+    table = parquet.read_table(tmp_path / "estimates.parquet")
+    assert table.column_names[-2:] == ["convergence", "mixture_size"]
+    first, *_, last = table.to_pylist()
+    assert (first["convergence"], first["mixture_size"]) == ("not converged", 1)
+    assert (last["convergence"], last["mixture_size"]) == ("settled", 1)
+    assert np.hypot(last["x_m"] - truth[-1, 0], last["y_m"] - truth[-1, 1]) < 1.0
     assert json.loads(json.dumps(result.document()))["convergence"] == "settled"
 
 

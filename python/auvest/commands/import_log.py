@@ -7,7 +7,8 @@ which columns of the log. docs/importers.md has the formats and the mapping.
 
 Data sets are goats14, hat_charles, labyrinth_uwb, mrclam6 and ugps_pier59 as the project's
 validation data have them, others of the same layout, and mrclam: the original text files of any
-UTIAS MR.CLAM set. Their logs are named by SOURCE.
+UTIAS MR.CLAM set; mrclam6_tracks and mrclam_tracks make logs of echoes of these, two_vehicles one
+of a slave and its master. Their logs are named by SOURCE.
 
 Examples
 --------

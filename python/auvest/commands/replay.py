@@ -1,8 +1,10 @@
 """``auvest replay``: recorded runs through a filter, with tables, a figure and a report of each.
 
 A LOG is a folder of CSV files, as docs/logs.md describes it and 'auvest import' makes it. For each
-the output folder gets a folder with the estimates, measurements and errors as CSV and Parquet, the
-track as TUM text, a figure, one self-contained HTML report and results.json.
+the output folder gets a folder with the estimates, measurements and errors as Parquet, the track as
+TUM text, a figure, one self-contained HTML report and results.json. --write says which of them,
+--format csv how tables are written; --every 1 writes one estimate a second. A log of echoes also
+gets the masters that were tracked.
 
 The log is checked on the way as 'auvest check' does it, and the result has a verdict: sound,
 doubtful or not to be trusted, with the reason; no truth is looked at for it.
@@ -22,12 +24,15 @@ Examples
   auvest replay logs/goats14 --config goats14 --smooth
 
   auvest replay logs/robot* --filter ekf --json --quiet | jq '.logs[].rmse_m'
+
+  auvest replay logs/day --write estimates,errors --format csv --every 1
 """
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 from rich.markup import escape
@@ -41,6 +46,7 @@ from auvest.errors import FilterError
 from auvest.logs import LogFolder
 from auvest.replay import Result
 from auvest.replay import replay as run_replay
+from auvest.replay.run import FORMATS, PAGES, TABLES, WRITTEN
 
 Smooth = Annotated[
     bool, typer.Option("--smooth", help="Go back over each log with what came later.")
@@ -55,6 +61,24 @@ Lag = Annotated[
         show_default="everything that came later",
     ),
 ]
+_ALL = ",".join(WRITTEN)
+Write = Annotated[
+    str,
+    typer.Option(
+        "--write", help=f"What is written beside results.json: {', '.join(WRITTEN)}.",
+        metavar="LIST", show_default="all",
+    ),
+]  # fmt: skip
+Format = Annotated[
+    Literal["parquet", "csv", "both"], typer.Option("--format", help="How tables are written.")
+]
+Every = Annotated[
+    float,
+    typer.Option(
+        "--every", help="One row in so many seconds of estimates, errors, masters and tracks.",
+        metavar="S", callback=options.not_negative, show_default="all",
+    ),
+]  # fmt: skip
 
 
 def command(
@@ -65,6 +89,9 @@ def command(
     kernel: log_options.KernelOption = None,
     smooth: Smooth = False,
     lag_s: Lag = None,
+    write: Write = _ALL,
+    kind: Format = "parquet",
+    every_s: Every = 0.0,
     output: options.Output = Path("auvest-output/replay"),
     force: options.Force = False,
     as_json: options.Json = False,
@@ -74,6 +101,10 @@ def command(
     terminal = Terminal(as_json=as_json, quiet=quiet)
     if lag_s is not None and not smooth:
         raise typer.BadParameter("needs --smooth.", param_hint="'--lag'")
+    wanted = [word.strip() for word in write.split(",")]
+    if not {*wanted} <= {*WRITTEN}:
+        raise typer.BadParameter(f"must be of {', '.join(WRITTEN)}.", param_hint="'--write'")
+    formats = FORMATS if kind == "both" else (kind,)
     with terminal.usage_errors():
         settings = log_options.settings_of(config, changes, kernel)
         folders = [LogFolder(path, reading=settings.reading) for path in logs]
@@ -98,12 +129,15 @@ def command(
                     progress=progress,
                     smooth=smooth,
                     lag_s=lag_s,
+                    write=wanted,
+                    formats=formats,
+                    every_s=every_s,
                 )
             except FilterError as error:
                 terminal.fail(f"{name}: {error}", ExitCode.FAILED)
         results.append(result)
         with terminal.writing(target.path):
-            _write(target.part, result)
+            _write(target.part, result, wanted)
         terminal.publish(target, interrupted=result.interrupted)
         if result.interrupted:
             break
@@ -115,7 +149,7 @@ def command(
     }
     terminal.result_json(document)
     for result in results:
-        _show(terminal, result, output / result.name)
+        _show(terminal, result, output / result.name, wanted, formats)
     if interrupted:
         terminal.fail(
             f"interrupted in {results[-1].name}: what was done is written to {output}",
@@ -123,28 +157,37 @@ def command(
         )
 
 
-def _write(folder: Path, result: Result) -> None:
+def _write(folder: Path, result: Result, wanted: list[str]) -> None:
     """Write results.json, the figure and the report."""
+    write_results(folder, result.document())
+    if not {*wanted} & {*PAGES}:
+        return
     from auvest import plots  # here, because matplotlib takes long to import
     from auvest.replay import figures, report
 
-    write_results(folder, result.document())
     with plots.own_style():
-        plots.save(figures.overview(result), folder / "figure.png")
-        write_text(folder / "report.html", report.html(result))
+        if "figure" in wanted:
+            plots.save(figures.overview(result), folder / "figure.png")
+        if "report" in wanted:
+            write_text(folder / "report.html", report.html(result))
 
 
-def _show(terminal: Terminal, result: Result, folder: Path) -> None:
+def _show(
+    terminal: Terminal, result: Result, folder: Path, wanted: list[str], formats: Collection[str]
+) -> None:
     from auvest.replay import report
 
     title = f"{result.name}, {result.filter_name}"
     terminal.result(table(title, ("quantity", "value"), report.rows(result), right={1}))
-    terminal.result(f"report    {shown(folder / 'report.html')}")
-    terminal.result(
-        f"tables    {shown(folder)}: estimates, measurements, errors as .csv and .parquet"
-    )
-    terminal.result(f"track     {shown(folder / 'trajectory.tum')}")
-    if "smoothed" in result.numbers:
+    if "report" in wanted:
+        terminal.result(f"report    {shown(folder / 'report.html')}")
+    made = [name for name in TABLES if any((folder / f"{name}.{one}").exists() for one in formats)]
+    if made:
+        kinds = " and ".join(f".{one}" for one in formats)
+        terminal.result(f"tables    {shown(folder)}: {', '.join(made)} as {kinds}")
+    if "tracks" in wanted:
+        terminal.result(f"track     {shown(folder / 'trajectory.tum')}")
+    if "smoothed" in result.numbers and "tracks" in wanted:
         terminal.result(f"smoothed  {shown(folder / 'smoothed.tum')}")
     terminal.result("")
     for warning in report.warnings(result):

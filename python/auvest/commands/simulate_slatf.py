@@ -12,6 +12,10 @@ Examples
   auvest simulate slatf --masters 3 --association unknown --gate 16
 
   auvest simulate slatf --filter ekf-slat --runs 1000 --table parquet --json > ekf.json
+
+  auvest simulate slatf --runs 1 --log --output sea
+
+  auvest replay sea/log --config sea/log/auvest.toml
 """
 
 from __future__ import annotations
@@ -41,6 +45,7 @@ from auvest.commands.session import Floats, Session, failure, mean_over_runs
 from auvest.commands.version import version
 from auvest.simulation.paper_slatf import LEVELS, PARTICLES, RUNS, FilterName, paper_filter
 from auvest.simulation.slat import SlatResult, SlatScenario, paper_masters, simulate
+from auvest.simulation.slat_log import write_log
 from auvest.slat import MAX_MASTERS, Lanes, ParticleSlatFilter, Resampling, Slatf
 
 if TYPE_CHECKING:
@@ -120,6 +125,10 @@ def command(
     table: Annotated[
         Literal["csv", "parquet"], option("Output", "Format of the table of runs.")
     ] = "csv",
+    log: Annotated[
+        bool,
+        option("Output", "Also write the first run as a log, with its settings.", "--log"),
+    ] = False,
     force: options.Force = False,
     no_figure: options.NoFigure = False,
     as_json: options.Json = False,
@@ -132,7 +141,7 @@ def command(
     if filter_name not in ("slatf1", "slatf2"):
         refuse_given(ctx, ("lanes",), "belongs to slatf1 and slatf2.")
     if filter_name == "dead-reckoning":
-        refuse_given(ctx, ("gate",), "does nothing: dead reckoning hears no echo.")
+        refuse_given(ctx, ("gate", "log"), "does nothing: dead reckoning hears no echo.")
     name, title = _FILTERS[filter_name]
     noise = LEVELS[level - 1]
     with terminal.usage_errors():
@@ -186,6 +195,10 @@ def command(
     session.write_csv("per_ping", per_ping)
     with terminal.writing(output):
         session.add("runs", montecarlo.write_table(session.part / f"runs.{table}", per_run(result)))
+    if log:
+        with terminal.writing(output), terminal.usage_errors():
+            write_log(session.part / "log", filter_, scenario)
+            session.add("log", session.part / "log")
     if not no_figure:
         session.draw(_figure, result, title)
     session.report(values, _table(values, scenario, title), per_ping=per_ping)

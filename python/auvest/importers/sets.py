@@ -22,6 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from auvest._outputs import NewFolder, OutputError, is_plain_file
+from auvest.importers.robots import Robots, within
 from auvest.logs.reader import LogError, LogFolder, Rows
 from auvest.logs.write import write_file
 
@@ -176,17 +177,17 @@ def mrclam6(source: Path) -> dict[str, Log]:
     Sightings in both directions are ranges of the slave, their bearings are left out. The others'
     positions, and the truth, are those of the motion capture.
     """
-    sightings = _table(source / "sightings.csv", "t", "observer", "subject", "range")
-    odometry = _table(source / "odometry.csv", "robot", "t", "v", "w")
-    truth = _table(source / "groundtruth.csv", "robot", "t", "x", "y", "theta")
-    robots = np.unique(truth[:, 0]).astype(int).tolist()
-    if len(robots) < 2:
-        raise LogError(source / "groundtruth.csv", "one robot alone has nobody to range to")
-    return _robots(
-        sightings,
-        {robot: odometry[odometry[:, 0] == robot, 1:] for robot in robots},
-        {robot: truth[truth[:, 0] == robot, 1:] for robot in robots},
-    )
+    return _slaves(robots_of_mrclam6(source, "range"))
+
+
+@_importer
+def mrclam6_tracks(source: Path) -> dict[str, Log]:
+    """Read the same as logs of echoes: one for each track of a robot as another sees it.
+
+    A track has at least 15 s of sightings without a gap above 6 s, while the truth of both is
+    known; it starts at the slave's true pose, with the first of them.
+    """
+    return _tracks(source / "sightings.csv", robots_of_mrclam6(source))
 
 
 @_importer
@@ -195,6 +196,50 @@ def mrclam(source: Path) -> dict[str, Log]:
 
     As :func:`mrclam6`, with all of the motion capture. Time is counted from the first second of it.
     """
+    return _slaves(_robots_of_mrclam(source))
+
+
+@_importer
+def mrclam_tracks(source: Path) -> dict[str, Log]:
+    """Read these text files as :func:`mrclam6_tracks` does."""
+    return _tracks(source / "Robot1_Measurement.dat", _robots_of_mrclam(source))
+
+
+@_importer
+def two_vehicles(source: Path) -> dict[str, Log]:
+    """Slave and master: odometry.csv (t, v, w) and sonar.csv (t, range, bearing) of the slave.
+
+    Bearings are from its heading. truth of both: groundtruth.csv (t, x, y, theta), at the first
+    line of which the run starts, and master.csv (t, x, y).
+    """
+    truth = _table(source / "groundtruth.csv", "t", "x", "y", "theta")
+    log = {
+        "odometry.csv": _velocity(_table(source / "odometry.csv", "t", "v", "w")),
+        "echoes.csv": _echoes(_table(source / "sonar.csv", "t", "range", "bearing"), 1),
+        "truth.csv": _truth(truth),
+    }
+    if (path := source / "master.csv").exists():
+        log["master_truth.csv"] = _of_source(_table(path, "t", "x", "y"), 1)
+    return {_name(source): log}
+
+
+def robots_of_mrclam6(source: Path, *seen: str) -> Robots:
+    """Read groundtruth.csv, odometry.csv and what was seen in sightings.csv, of several robots."""
+    seen = seen or ("range", "bearing")
+    sightings = _table(source / "sightings.csv", "t", "observer", "subject", *seen)
+    odometry = _table(source / "odometry.csv", "robot", "t", "v", "w")
+    truth = _table(source / "groundtruth.csv", "robot", "t", "x", "y", "theta")
+    robots = np.unique(truth[:, 0]).astype(int).tolist()
+    if len(robots) < 2:
+        raise LogError(source / "groundtruth.csv", "one robot alone has nobody to range to")
+    return Robots(
+        {robot: odometry[odometry[:, 0] == robot, 1:] for robot in robots},
+        {robot: truth[truth[:, 0] == robot, 1:] for robot in robots},
+        sightings,
+    )
+
+
+def _robots_of_mrclam(source: Path) -> Robots:
     barcodes = {code: int(subject) for subject, code in _text(source / "Barcodes.dat", 2)}
     robots = range(1, 6)
     truth = {robot: _text(source / f"Robot{robot}_Groundtruth.dat", 4) for robot in robots}
@@ -207,8 +252,8 @@ def mrclam(source: Path) -> dict[str, Log]:
         seen = _text(source / f"Robot{robot}_Measurement.dat", 4)
         subject = np.array([barcodes.get(code, -1) for code in seen[:, 1]], float)
         observer = np.full(len(seen), float(robot))
-        sightings.append(np.column_stack([seen[:, 0] - start, observer, subject, seen[:, 2]]))
-    return _robots(np.concatenate(sightings), odometry, truth)
+        sightings.append(np.column_stack([seen[:, 0] - start, observer, subject, seen[:, 2:4]]))
+    return Robots(odometry, truth, np.concatenate(sightings))
 
 
 @_importer
@@ -244,6 +289,9 @@ IMPORTERS: Mapping[str, Importer] = {
     "labyrinth_uwb": labyrinth_uwb,
     "mrclam6": mrclam6,
     "mrclam": mrclam,
+    "mrclam6_tracks": mrclam6_tracks,
+    "mrclam_tracks": mrclam_tracks,
+    "two_vehicles": two_vehicles,
     "ugps_pier59": ugps_pier59,
 }
 
@@ -254,6 +302,7 @@ _TELLS: Mapping[str, str] = {
     "labyrinth_uwb": "initial_heading.txt",
     "mrclam6": "sightings.csv",
     "mrclam": "Barcodes.dat",
+    "two_vehicles": "sonar.csv",
     "ugps_pier59": "fixes_1.csv",
 }
 
@@ -267,10 +316,10 @@ def _name(source: Path) -> str:
     return source.resolve().name
 
 
-def _robots(
-    sightings: Rows, odometry: Mapping[int, Rows], truth: Mapping[int, Rows]
-) -> dict[str, Log]:
-    sightings = sightings[np.argsort(sightings[:, 0], kind="stable")]
+def _slaves(robots: Robots) -> dict[str, Log]:
+    """Make a log of each robot that ranges to the others, whose places it knows."""
+    odometry, truth = robots.odometry, robots.truth
+    sightings = robots.sightings[np.argsort(robots.sightings[:, 0], kind="stable")]
     logs: dict[str, Log] = {}
     for robot in truth:
         others = [other for other in truth if other != robot]
@@ -295,6 +344,28 @@ def _robots(
     return logs
 
 
+def _tracks(path: Path, robots: Robots) -> dict[str, Log]:
+    """Make a log of each track; ``path`` is named where there is none."""
+    logs: dict[str, Log] = {}
+    for slave, master, echoes in robots.tracks():
+        begin, end = float(echoes[0, 0]), float(echoes[-1, 0])
+        pose = robots.pose(slave, echoes[:1, 0])[0]
+        pair = f"robot{slave}_sees_robot{master}"
+        number = 1 + sum(name.startswith(pair) for name in logs)
+        truth = within(robots.truth[slave], begin, end, beyond=1)
+        of_master = within(robots.truth[master], begin, end, beyond=1)
+        logs[f"{pair}_{number}"] = {
+            "odometry.csv": _velocity(within(robots.odometry[slave], begin, end, beyond=0)),
+            "echoes.csv": _echoes(echoes, master),
+            "start.csv": _start(np.array([begin, *pose[:2]]), float(pose[2])),
+            "truth.csv": _truth(truth),
+            "master_truth.csv": _of_source(of_master, master),
+        }
+    if not logs:
+        raise LogError(path, "no robot sees another for long enough while both have a truth")
+    return logs
+
+
 _Columns: TypeAlias = dict[str, npt.NDArray[np.generic]]
 
 
@@ -308,6 +379,17 @@ def _velocity(rows: Rows) -> _Columns:
 
 def _ranges(rows: Rows) -> _Columns:
     return {"time_s": rows[:, 0], "source": rows[:, 1].astype(int), "range_m": rows[:, 2]}
+
+
+def _echoes(rows: Rows, master: int) -> _Columns:
+    source = np.full(len(rows), master)
+    bearing = _wrapped(rows[:, 2])
+    return {"time_s": rows[:, 0], "source": source, "range_m": rows[:, 1], "bearing_rad": bearing}
+
+
+def _of_source(rows: Rows, source: int) -> _Columns:
+    number = np.full(len(rows), source)
+    return {"time_s": rows[:, 0], "source": number, "x_m": rows[:, 1], "y_m": rows[:, 2]}
 
 
 def _beacons(rows: Rows) -> _Columns:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
@@ -94,16 +95,38 @@ class HeldLog(LogFolder):
         The log.
     lines : int
         How many lines of each file.
+    measurements : int
+        A log of which a file has more of them ends with that one.
     start : tuple of float, optional
         Time, x, y and heading of the start, where the log has no file that says so.
     """
 
-    def __init__(self, log: LogFolder, lines: int, start: tuple[float, ...] | None = None) -> None:
+    def __init__(
+        self,
+        log: LogFolder,
+        lines: int,
+        measurements: int,
+        start: tuple[float, ...] | None = None,
+    ) -> None:
         self.path, self.frame = log.path, log.frame
-        self.tables = {
-            name: HeldTable(table.path, name, table.columns, _first(table, lines))
+        held = {
+            name: _first(table, lines)
             for name, table in log.tables.items()
-            if name != "truth.csv"
+            if name not in reader.TRUTHS
+        }
+        measured = (
+            held[name] for name in ("ranges.csv", "fixes.csv", "positions.csv") if name in held
+        )
+        end_s = max(
+            (float(rows[measurements - 1, 0]) for rows in measured if len(rows) > measurements),
+            default=math.inf,
+        )
+        for name, rows in held.items():
+            if "time_s" in log[name].names:
+                held[name] = rows[rows[:, 0] <= end_s]
+        self.tables = {
+            name: HeldTable(log[name].path, name, log[name].columns, rows)
+            for name, rows in held.items()
         }
         said = self.tables.get("start.csv")
         if start is not None and (said is None or "heading_rad" not in said.names):

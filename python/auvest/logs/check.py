@@ -1,6 +1,6 @@
 """What the files of a log show before any filter runs: what is there, rates, gaps, suspicions.
 
-:func:`survey` reads every file once, a chunk at a time, but truth.csv, which nothing here looks at.
+:func:`survey` reads every file once, a chunk at a time, but the truth, which nothing here looks at.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy.typing as npt
 from auvest.logs.findings import Finding, finding
 from auvest.logs.layout import FILES
 from auvest.logs.origin import local_origin
-from auvest.logs.reader import CsvTable, LogError, LogFolder, Rows
+from auvest.logs.reader import TRUTHS, CsvTable, LogError, LogFolder, Rows
 
 #: Half of the lines follow with less than this on the one before in any log of seconds, s: the
 #: slowest odometry that a velocity may be taken from, and the slowest fixes.
@@ -349,8 +349,8 @@ def survey(log: LogFolder, limits: Limits) -> Survey:
     """
     files = {}
     for name, table in log.tables.items():
-        if "time_s" not in table.names or name == "truth.csv":
-            continue
+        if "time_s" not in table.names or name in TRUTHS or name == "masters.csv":
+            continue  # what is told of masters has one time, not a clock
         files[name] = FileSeen(table, limits.reorder_s)
         for rows, first in table.chunks():
             files[name].add(rows, first)
@@ -412,7 +412,8 @@ def _units(files: dict[str, FileSeen], limits: Limits) -> Iterator[Finding]:
             message = f"the craft would turn by {seen.usual_turn_rad_s:.3g} rad/s: degrees?"
             yield finding("degrees", message, file=name)
         step = seen.usual_step_s
-        several = "source" in seen.table.names  # of which lines of one time are none
+        # Lines of one time are of several sources, known or not.
+        several = "source" in seen.table.names or name == "echoes.csv"
         if seen.lines > 2 and seen.equal > 0.5 * (seen.lines - 1) and not several:
             message = f"{seen.equal + 1} of {seen.lines} lines have the time of the line before"
             yield finding("times_equal", message, file=name, line=seen.first_equal)
@@ -532,7 +533,7 @@ def _is_jump(step: Step, files: dict[str, FileSeen]) -> bool:
 
 
 def _sources(files: dict[str, FileSeen]) -> Iterator[Finding]:
-    names = ("ranges.csv", "fixes.csv", "positions.csv")
+    names = ("ranges.csv", "fixes.csv", "positions.csv", "echoes.csv")
     measured = [files[name] for name in names if name in files]
     if not any(seen.lines for seen in measured):
         yield finding("no_measurements", "has no line below the header", file=measured[0].name)

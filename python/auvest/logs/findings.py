@@ -40,6 +40,7 @@ CAUSES: Mapping[str, tuple[str, Verdict]] = {
     "not_converged": ("the ranges do not say where the craft is", "not_trusted"),
     "ambiguous": ("the ranges leave several places", "not_trusted"),
     "settling": ("the ranges leave one place, not yet confirmed", "doubtful"),
+    "overconfident": ("particles were resampled so often that sigmas are too small", "sound"),
     # what innovations show
     "not_used": ("measurements that no filter was given", "doubtful"),
     "lengths_apart": ("ranges and positions differ in unit or origin", "not_trusted"),

@@ -104,6 +104,10 @@ COLUMNS: Mapping[str, Column] = {
         _speed("left_m_s"),
         _speed("starboard_m_s"),
         _speed("down_m_s"),
+        _speed("vx_m_s"),
+        _speed("vy_m_s"),
+        Column("ax_m_s2", -100, 100),
+        Column("ay_m_s2", -100, 100),
         Column("yaw_rate_rad_s", -20, 20, "degrees per second?", cause="degrees"),
         Column("range_m", 0, 1e5, "millimetres, or a code for 'no echo'?", cause="millimetres"),
         _angle("bearing_rad"),
@@ -116,6 +120,8 @@ COLUMNS: Mapping[str, Column] = {
         _length("y_m", 1e7),
         _length("depth_m", 12_000, -1000),
         _length("sigma_m", low=0),
+        Column("sigma_velocity_m_s", 0, 50, "millimetres per second?", cause="millimetres"),
+        Column("sigma_acceleration_m_s2", 0, 100),
         Column("latitude_deg", -90, 90),
         Column("longitude_deg", -360, 360),
     )
@@ -145,12 +151,24 @@ FILES: Mapping[str, tuple[Layout, ...]] = {
     "ranges.csv": (_layout("time_s,source,range_m"),),
     "fixes.csv": (_layout("time_s,source,range_m,bearing_rad", "elevation_rad"),),
     "positions.csv": (_layout("time_s,x_m,y_m", "sigma_m,depth_m"),),
+    "echoes.csv": (
+        _layout("time_s,source,range_m,bearing_rad"),
+        _layout("time_s,range_m,bearing_rad"),
+    ),
+    "masters.csv": (
+        _layout(
+            "time_s,source,x_m,y_m",
+            "vx_m_s,vy_m_s,ax_m_s2,ay_m_s2,sigma_m,sigma_velocity_m_s,sigma_acceleration_m_s2",
+        ),
+    ),
+    "plans.csv": (_layout("time_s,source,ax_m_s2,ay_m_s2"),),
     "velocities.csv": (_layout("time_s,forward_m_s,left_m_s,heading_rad", "down_m_s"),),
     "depth.csv": (_layout("time_s,depth_m"),),
     "beacons.csv": (_layout("source,x_m,y_m", "depth_m"),),
     "leaders.csv": (_layout("time_s,source,x_m,y_m", "sigma_m,depth_m"),),
     "start.csv": (_layout("time_s,x_m,y_m,heading_rad"), _layout("time_s,x_m,y_m")),
     "truth.csv": (_layout("time_s,x_m,y_m", "heading_rad"),),
+    "master_truth.csv": (_layout("time_s,source,x_m,y_m"),),
     "origin.csv": (_layout("latitude_deg,longitude_deg"),),
 }
 

@@ -34,13 +34,14 @@ def shifted(log: LogFolder, origin: tuple[float, float] | None) -> LogFolder:
         )  # fmt: skip
 
     places = {"beacons.csv": 1, "leaders.csv": 2, "start.csv": 1, "truth.csv": 1,
-              "positions.csv": 1}  # fmt: skip
+              "positions.csv": 1, "masters.csv": 2, "master_truth.csv": 2}  # fmt: skip
     return ChangedLog(log, {name: shift(first) for name, first in places.items()})
 
 
 def _somewhere(log: LogFolder) -> tuple[float, float]:
-    """Give a place of the log: the start, else the first beacon, leader or position."""
-    names = {"start.csv": 1, "beacons.csv": 1, "leaders.csv": 2, "positions.csv": 1}
+    """Give a place of the log: the start, else the first beacon, leader, position or master."""
+    names = {"start.csv": 1, "beacons.csv": 1, "leaders.csv": 2, "positions.csv": 1,
+             "masters.csv": 2}  # fmt: skip
     for name, first in names.items():
         if name in log:
             for rows, _ in log[name].chunks():

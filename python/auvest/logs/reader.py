@@ -24,6 +24,8 @@ Rows = npt.NDArray[np.float64]
 
 #: Lines read at once: a few megabytes, and long enough that the cost of a chunk does not count.
 CHUNK_LINES = 32768
+#: Of fewer lines numbers are read without pyarrow, which takes longer to import.
+FEW_LINES = 1000
 #: What a name ends with that is in another unit than the layout's.
 _OTHER_UNITS = frozenset(
     (
@@ -31,8 +33,15 @@ _OTHER_UNITS = frozenset(
         "cm", "km", "ft", "m_s", "mm_s", "cm_s", "km_h", "kn", "knots",
     )
 )  # fmt: skip
-#: More than any file has that is read as a whole: beacons.csv and start.csv.
+#: More than any file has that is read as a whole: beacons.csv, masters.csv and start.csv.
 SMALL_FILE_LINES = 100_000
+#: Files that no filter sees.
+TRUTHS = ("truth.csv", "master_truth.csv")
+#: Files that are of no use beside echoes.csv.
+NOT_WITH_ECHOES = (
+    "ranges.csv", "fixes.csv", "positions.csv", "velocities.csv", "depth.csv", "compass.csv",
+    "beacons.csv", "leaders.csv",
+)  # fmt: skip
 
 
 class LogError(ValueError):
@@ -183,11 +192,11 @@ class CsvTable:
         for lines, line in self._lines():
             yield self._converted(self._parse(lines, line)), line
 
-    def _lines(self) -> Iterator[tuple[list[str], int]]:
+    def _lines(self) -> Iterator[tuple[list[bytes], int]]:
         line = 2
-        blank: list[str] = []  # such lines at the end of the file are none, others are errors
+        blank: list[bytes] = []  # such lines at the end of the file are none, others are errors
         try:
-            with self.path.open(encoding="utf-8-sig", newline="\n") as file:
+            with self.path.open("rb") as file:
                 self.bytes_read = len(file.readline())
                 while chunk := list(islice(file, CHUNK_LINES)):
                     self.bytes_read += sum(map(len, chunk))
@@ -197,8 +206,6 @@ class CsvTable:
                         line += len(lines)
         except OSError as error:
             raise LogError(self.path, f"cannot be read: {error.strerror or error}") from None
-        except UnicodeDecodeError:
-            raise LogError(self.path, f"is not UTF-8 text after line {line - 1}") from None
 
     def whole(self) -> Rows:
         """All rows of a small file.
@@ -314,19 +321,56 @@ class CsvTable:
     def _mapped(self) -> set[str]:
         return {said.removeprefix("-") for said in self._reading.columns.values()}
 
-    def _parse(self, lines: list[str], first: int) -> Rows:
-        if not lines[-1].endswith("\n"):
+    def _parse(self, lines: list[bytes], first: int) -> Rows:
+        if not lines[-1].endswith(b"\n"):
             raise LogError(
                 self.path, "does not end with a line end: truncated", line=first + len(lines) - 1
             )
-        rows = self._loaded(lines)
+        rows = self._numbers(lines)
         if rows is None:
-            rows = np.array([self._parse_line(text, first + i) for i, text in enumerate(lines)])
+            try:
+                text = [line.decode() for line in lines]
+            except UnicodeDecodeError:
+                raise LogError(self.path, f"is not UTF-8 text after line {first - 1}") from None
+            rows = self._loaded(text)
+            if rows is None:
+                rows = np.array([self._parse_line(one, first + i) for i, one in enumerate(text)])
         for k, factor in enumerate(self._factors):
             if factor != 1.0:
                 rows[:, k] *= factor
         self._check(rows, first)
         return rows
+
+    def _numbers(self, lines: list[bytes]) -> Rows | None:
+        """Read lines of plain numbers fast; None if there is anything else among them."""
+        said = self._reading
+        if said.decimal != "." or said.separator == " " or "time" in self._given:
+            return None
+        text = b"".join(lines)
+        if len(lines) < FEW_LINES or not text.isascii():
+            return None
+        from pyarrow import ArrowInvalid, BufferReader, csv, float64  # here: slow to import
+
+        names = [str(k) for k in range(len(self._header))]
+        used = [names[k] for k in self._used]
+        with suppress(ArrowInvalid):  # the other ways to read say what is wrong, and where
+            table = csv.read_csv(
+                BufferReader(text),
+                csv.ReadOptions(use_threads=False, column_names=names, block_size=len(text)),
+                csv.ParseOptions(
+                    delimiter=said.separator, quote_char=False, ignore_empty_lines=False
+                ),
+                csv.ConvertOptions(
+                    include_columns=used, column_types=dict.fromkeys(used, float64()),
+                    null_values=[],
+                ),
+            )  # fmt: skip
+            if len(table) == len(lines):  # a carriage return ends a line there, and none here
+                # Not to_numpy, which imports pandas.
+                (batch,) = table.to_batches()
+                columns = (one.buffers()[1] for one in batch.columns)
+                return np.column_stack([np.frombuffer(one, np.float64) for one in columns])
+        return None
 
     def _loaded(self, lines: list[str]) -> Rows | None:
         """Read lines at once; None if one of them is not what it should be."""
@@ -414,7 +458,7 @@ class CsvTable:
             )
 
 
-def _without_blank_end(lines: list[str]) -> tuple[list[str], list[str]]:
+def _without_blank_end(lines: list[bytes]) -> tuple[list[bytes], list[bytes]]:
     """Part lines where nothing but blank ones follow."""
     end = len(lines)
     while end and not lines[end - 1].strip():
@@ -459,7 +503,7 @@ class LogFolder:
     LogError
         If it is not a folder with measurements: odometry.csv with ranges.csv, fixes.csv or
         positions.csv, or one of the last two alone; beside ranges and fixes beacons.csv,
-        leaders.csv or both.
+        leaders.csv or both; or odometry.csv with echoes.csv, and none of these.
     """
 
     def __init__(self, path: Path, *, truth: bool = True, reading: Reading | None = None) -> None:
@@ -473,7 +517,7 @@ class LogFolder:
                 raise LogError(one, f"is not there, and {reading.of(name).where} names it")
         names = [name for name, one in paths.items() if one.exists()]
         if not truth and ("start.csv" in names or "odometry.csv" not in names):
-            names = [name for name in names if name != "truth.csv"]
+            names = [name for name in names if name not in TRUTHS]
         self.frame = Frame(reading.frame)
         self.tables = {
             name: CsvTable(paths[name], name=name, reading=reading.of(name), frame=self.frame)
@@ -484,9 +528,14 @@ class LogFolder:
 
     def _require_what_a_log_needs(self) -> None:
         path = self.path
+        if "echoes.csv" in self:
+            self._require_what_echoes_need()
+            return
         measured = [name for name in ("ranges.csv", "fixes.csv", "positions.csv") if name in self]
         if not measured:
-            raise LogError(path, "has neither ranges.csv nor fixes.csv nor positions.csv")
+            raise LogError(
+                path, "has neither ranges.csv nor fixes.csv nor positions.csv nor echoes.csv"
+            )
         if "odometry.csv" not in self:
             if "ranges.csv" in self:
                 raise LogError(path, "has ranges.csv but no odometry.csv", cause="no_odometry")
@@ -508,9 +557,38 @@ class LogFolder:
                     "compass.csv: how does the craft turn?", line=1,
                 )  # fmt: skip
 
+    def _require_what_echoes_need(self) -> None:
+        others = {*NOT_WITH_ECHOES} & set(self.tables)
+        if others:
+            raise LogError(
+                self.path, f"has echoes.csv and {min(others)}; filters that hear the echoes of "
+                "masters take nothing else that is measured",
+            )  # fmt: skip
+        if "odometry.csv" not in self:
+            raise LogError(self.path, "has echoes.csv but no odometry.csv", cause="no_odometry")
+        table = self["odometry.csv"]
+        names = set(table.names)
+        if names & {"left_m", "left_m_s"}:
+            raise LogError(
+                table.path,
+                "says how the craft moves sideways, which filters of echoes do not know",
+                line=1,
+            )  # fmt: skip
+        turns = names & {"turn_rad", "yaw_rate_rad_s"}
+        if not turns and not {"speed_m_s", "heading_rad"} <= names:
+            raise LogError(
+                table.path,
+                "has no turn_rad or yaw_rate_rad_s, nor speed_m_s with heading_rad: how does the "
+                "slave turn?",
+                line=1,
+            )
+
     def _find_origin(self) -> None:
         """Find where on Earth (0, 0) is, if a file has places there."""
-        names = ("start.csv", "beacons.csv", "leaders.csv", "positions.csv", "truth.csv")
+        names = (
+            "start.csv", "beacons.csv", "leaders.csv", "positions.csv", "masters.csv", "truth.csv",
+            "master_truth.csv",
+        )  # fmt: skip
         geographic = [name for name in names if name in self and self[name].geographic]
         local = [name for name in names if name in self and not self[name].geographic]
         if "origin.csv" in self:
@@ -534,6 +612,11 @@ class LogFolder:
 
     def __getitem__(self, name: str) -> CsvTable:
         return self.tables[name]
+
+    @property
+    def echoing(self) -> bool:
+        """True if a slave hears the echoes of masters."""
+        return "echoes.csv" in self
 
     @property
     def tracking(self) -> bool:

@@ -20,6 +20,19 @@ from auvest.replay.config import FilterName, Settings
 from auvest.replay.engine import replay_of
 from auvest.replay.health import Health, Residuals, findings, health, start_findings
 
+#: Sections of the settings that are not for all kinds of log.
+_SECTIONS = {
+    "odometry": ("ranging", "echoes"),
+    "ranges": ("ranging",),
+    "fixes": ("tracking",),
+    "process": ("tracking",),
+    "interval": ("tracking",),
+    "sonar": ("echoes",),
+    "slave": ("echoes",),
+    "masters": ("echoes",),
+    "slat": ("echoes",),
+}
+
 
 @dataclass(frozen=True)
 class Checked:
@@ -58,7 +71,8 @@ class Checked:
 
 def filter_of(log: LogFolder, settings: Settings, chosen: FilterName | None) -> FilterName:
     """Give the filter: that which is chosen, that of the settings, or that which fits the log."""
-    return chosen or settings.filter.kind or ("ukf" if log.tracking else "robust-ekf")
+    fits: FilterName = "ukf" if log.tracking else "robust-ekf"
+    return chosen or settings.filter.kind or ("slatf-joint" if log.echoing else fits)
 
 
 def limits(settings: Settings) -> Limits:
@@ -86,12 +100,14 @@ def files(log: LogFolder, settings: Settings) -> list[Finding]:
 
 def _idle(log: LogFolder, settings: Settings) -> Iterator[Finding]:
     """Name what was set, and is for the other kind of log."""
-    kind = "ranging" if log.tracking else "tracking"
-    ranging, tracking = ["odometry", "ranges"], ["fixes", "process", "interval"]
+    kind = "echoes" if log.echoing else "tracking" if log.tracking else "ranging"
     default = Settings()
-    for name in ranging if log.tracking else tracking:
-        if getattr(settings, name) != getattr(default, name):
-            message = f"[{name}] of the settings is of no use here: it is for logs of {kind}"
+    for name, kinds in _SECTIONS.items():
+        if kind not in kinds and getattr(settings, name) != getattr(default, name):
+            message = (
+                f"[{name}] of the settings is of no use here: it is for logs of "
+                f"{' and '.join(kinds)}"
+            )
             yield finding("ignored_settings", message)
 
 
@@ -106,12 +122,12 @@ def innovations(
 ) -> list[Finding]:
     """Say what a replay left, and why.
 
-    Where the files have shown already what is wrong, or the start was not found, no other cause is
-    looked for.
+    Where the files have shown already what is wrong, the start was not found, or masters move as
+    nobody knows, no other cause is looked for.
     """
     lost = start_findings(residuals)
     shown = [*lost, *findings(residuals)]
-    if not causes or worst(one.verdict for one in [*found, *lost]) != "sound":
+    if log.echoing or not causes or worst(one.verdict for one in [*found, *lost]) != "sound":
         return shown
     named = diagnosis.diagnose(log, settings, filter_name, gross=bool(shown))
     if named:  # it explains why one source has more of it than others
@@ -165,6 +181,7 @@ def _replayed(
 ) -> list[Finding]:
     name = filter_of(log, settings, filter_name)
     local = shifted(log, local_origin(log))
-    for batch in replay_of(local, settings, name).batches():
+    engine = replay_of(local, settings, name)
+    for batch in engine.batches():
         left.add(batch)
-    return innovations(local, settings, name, left, found)
+    return [*engine.findings(), *innovations(local, settings, name, left, found)]

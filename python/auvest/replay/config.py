@@ -10,28 +10,44 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias, get_args, get_type_hints
 
 from auvest import _core
-from auvest._fields import flag, integer, not_negative, number, positive
+from auvest._fields import flag, fraction, integer, not_negative, number, positive
 from auvest._outputs import is_plain_file
 from auvest.kernels import KERNELS, Kernel, RejectionStreak
 from auvest.logs.layout import COLUMNS, FILES
 from auvest.logs.reading import SEPARATORS, UNITS, Axes, FileReading, Reading, columns_of
+from auvest.models import ConstantAcceleration
 
 if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
 
-FilterName: TypeAlias = Literal["ekf", "ukf", "ckf", "aukf", "robust-ekf", "robust-ukf"]
+FilterName: TypeAlias = Literal[
+    "ekf", "ukf", "ckf", "aukf", "robust-ekf", "robust-ukf",
+    "slatf1", "slatf2", "slatf-joint", "ekf-slat",
+]  # fmt: skip
 KernelName: TypeAlias = Literal["huber", "hampel", "igg"]
 ResidualName: TypeAlias = Literal["innovation", "post-fit"]
 DiscretisationName: TypeAlias = Literal["exact", "euler"]
 DTypeName: TypeAlias = Literal["float64", "float32"]
 PolicyName: TypeAlias = Literal["fixed", "covariance-budget", "mahalanobis"]
+BearingName: TypeAlias = Literal["from_heading", "slave_to_master", "master_to_slave"]
+MasterName: TypeAlias = Literal["piecewise", "imm"]
+ResamplingName: TypeAlias = Literal["systematic", "stratified", "residual", "multinomial"]
+CovarianceName: TypeAlias = Literal["particle", "shared"]
 
 _PACKAGED = Path(__file__).parent / "configs"
 _KERNELS = _core.kernel_defaults()
 _ROBUST = _core.robust_update_defaults()
 _POINTS = _core.sigma_points_defaults()
+_COMPASS = _core.compass_motion_defaults()
+_UNICYCLE = _core.unicycle_motion_defaults()
+_SONAR = _core.sonar_defaults()
+_PIECEWISE = _core.piecewise_acceleration_defaults()
+_IMM = _core.imm_defaults()
+_ACCELERATED = ConstantAcceleration()
+_SLATF = _core.slatf_defaults()
+_MOST = 2**64 - 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +60,8 @@ class FilterSettings:
     one whose heading is not known either.
     """
 
-    kind: FilterName | None = None  # default: robust-ekf with odometry, ukf without
+    # default: robust-ekf with odometry, ukf without, slatf-joint with echoes
+    kind: FilterName | None = None
     kernel: KernelName = "hampel"  # its thresholds are in [kernel]
     recovery: bool = flag(True)  # from lock-out
     rejections: int = integer(_ROBUST["rejections"], 1, 60)  # in a row, until it acts
@@ -74,10 +91,13 @@ class KernelSettings:
 
 @dataclass(frozen=True, kw_only=True)
 class StartSettings:
-    """Standard deviations of the belief that the run starts with."""
+    """Standard deviations of the belief that the run starts with.
 
-    sigma_position_m: float = positive(1.0)
-    sigma_heading_rad: float = positive(0.1)
+    Filters that hear echoes take 0 for a pose that is known.
+    """
+
+    sigma_position_m: float = not_negative(1.0)
+    sigma_heading_rad: float = not_negative(0.1)
     sigma_speed_m_s: float = positive(0.5)
     sigma_acceleration_m_s2: float = positive(0.1)
 
@@ -216,12 +236,87 @@ class IntervalSettings:
 
 
 @dataclass(frozen=True, kw_only=True)
+class SonarSettings:
+    """Echoes of masters, as of :class:`auvest.Sonar`."""
+
+    sigma_range_m: float = positive(_SONAR["sigma_range_m"])
+    sigma_bearing_rad: float = positive(_SONAR["sigma_bearing_rad"])
+    bearing: BearingName | None = None  # default: from_heading with turns, else slave_to_master
+    smallest_m: float = number(_SONAR["smallest_range_m"])
+    largest_m: float = positive(math.inf, infinite=True)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlaveSettings:
+    """What a slave that hears echoes reads of its own motion: noise of one reading."""
+
+    sigma_speed_m_s: float | None = not_negative(None)  # default: that of the motion
+    sigma_heading_rad: float = not_negative(_COMPASS["sigma_heading_rad"])  # of speed and heading
+    sigma_yaw_rate_rad_s: float = not_negative(_UNICYCLE["sigma_yaw_rate_rad_s"])
+    compensate_bias: bool = flag(_COMPASS["compensate_bias"])  # of a noisy heading
+    mean_s: float = not_negative(0.0)  # readings are means over so long; 0: each line is one
+
+
+@dataclass(frozen=True, kw_only=True)
+class MastersSettings:
+    """How masters move, and what is not known of one that is met."""
+
+    model: MasterName = "piecewise"
+    sigma_m: float = positive(1.0)  # where masters.csv does not say
+    sigma_velocity_m_s: float = positive(0.05)  # and of one that is known by its first echo
+    sigma_acceleration_m_s2: float = positive(0.01)
+    acceleration_m_s2: float = not_negative(_PIECEWISE["acceleration_m_s2"])  # of piecewise
+    position_psd: float = not_negative(_PIECEWISE["position_psd"])  # of piecewise
+    straight_velocity_psd: float = not_negative(_IMM["straight"]["velocity_psd"])  # of imm, as all
+    straight_sigma_acceleration_m_s2: float = not_negative(
+        _IMM["straight"]["sigma_acceleration_m_s2"]
+    )
+    accelerated_position_psd: float = not_negative(_ACCELERATED.position_psd)
+    accelerated_velocity_psd: float = not_negative(_ACCELERATED.velocity_psd)
+    accelerated_acceleration_psd: float = not_negative(_ACCELERATED.acceleration_psd)
+    turning_position_psd: float = not_negative(_IMM["turning"]["position_psd"])
+    turning_velocity_psd: float = not_negative(_IMM["turning"]["velocity_psd"])
+    turning_acceleration_psd: float = not_negative(_IMM["turning"]["acceleration_psd"])
+    turning_slow_m_s: float = positive(_IMM["turning"]["slow_m_s"])
+    share_straight: float = fraction(1 / 3)  # of the time; the three have the sum 1
+    share_accelerated: float = fraction(1 / 3)
+    share_turning: float = fraction(1 / 3)
+    switch_rate_hz: float = not_negative(_IMM["switch_rate_hz"])
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlatSettings:
+    """Filters that hear echoes, as of :class:`auvest.Slatf` and its like."""
+
+    particles: int = integer(100, 1, 10_000_000)
+    seed: int = integer(1, 0, _MOST)
+    stream: int = integer(0, 0, _MOST)
+    resampling: ResamplingName = "systematic"
+    resample_below: float = fraction(_SLATF["resample_below"])
+    monte_carlo: bool = flag(_SLATF["monte_carlo"])  # slatf1, slatf2
+    carry_covariance: bool = flag(_SLATF["carry_covariance"])  # slatf2
+    birth_velocity_m_s: float = not_negative(_SLATF["birth_velocity_m_s"])  # slatf1, slatf2
+    birth_acceleration_m_s2: float = positive(_SLATF["birth_acceleration_m_s2"])
+    covariance: CovarianceName = "particle"  # slatf-joint
+    kept: float | None = not_negative(None)  # slatf-joint; default: that of the covariance
+    max_masters: int = integer(1, 1, _core.slat_max_masters)  # slatf-joint
+    consider: bool = flag(False)  # ekf-slat
+    gate: float = not_negative(_SLATF["gate"])  # NIS beyond which an echo says nothing; 0: no gate
+    recover_after: int = integer(_SLATF["recover_after"], 0, 16)
+    recover_of: int = integer(_SLATF["recover_of"], 0, 16)
+    fastest_m_s: float = not_negative(_SLATF["fastest_m_s"])
+    forget_after_s: float = not_negative(_SLATF["forget_after_s"])
+    rebirth_velocity_m_s: float = positive(_SLATF["rebirth_velocity_m_s"])
+    rebirth_acceleration_m_s2: float = positive(_SLATF["rebirth_acceleration_m_s2"])
+
+
+@dataclass(frozen=True, kw_only=True)
 class LogSettings:
     """Axes, window for late lines, longest gap in a leader's track that a line bridges."""
 
     frame: Axes = "enu"  # x east, y north; ned: x north, y east
     reorder_s: float = not_negative(0.0)
-    leader_gap_s: float = not_negative(1.0)
+    leader_gap_s: float = not_negative(1.0)  # with echoes also of the truth
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -240,6 +335,10 @@ class Settings:
     depth: DepthSettings = DepthSettings()
     process: ProcessSettings = ProcessSettings()
     interval: IntervalSettings = IntervalSettings()
+    sonar: SonarSettings = SonarSettings()
+    slave: SlaveSettings = SlaveSettings()
+    masters: MastersSettings = MastersSettings()
+    slat: SlatSettings = SlatSettings()
     log: LogSettings = LogSettings()
     files: Mapping[str, FileReading] = field(default_factory=dict)
 

@@ -29,6 +29,8 @@ from auvest.replay.tables import Columns
 
 #: So many lines of each file are looked at: a diagnosis of a day takes no longer than of an hour.
 LINES = 100_000
+#: So many measurements tell all causes apart that any number does.
+MEASUREMENTS = 10_000
 #: Share of outliers that the likelihood allows for, and over how many metres they are spread.
 OUTLIERS, OUTLIER_REACH_M = 0.05, 100.0
 #: A cause must make the innovations so much likelier: in all, and per measurement (nats).
@@ -107,7 +109,7 @@ def diagnose(
     if filter_name in ("robust-ukf", "robust-ekf"):
         kind = filter_name
     start = replay_of(log, settings, kind).start
-    held = HeldLog(log, LINES, start if math.isfinite(start[0]) else None)
+    held = HeldLog(log, LINES, MEASUREMENTS, start if math.isfinite(start[0]) else None)
     run = _Refits(held, settings, kind)
     as_is = run.run(Hypothesis("", {}, ""))
     if as_is is None or len(as_is.rows["nis"]) < FEW:

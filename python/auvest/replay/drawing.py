@@ -29,6 +29,7 @@ _MEASURED = {
     "position": (("x", "m"), ("y", "m"), ("depth", "m")),
     "velocity": (("speed", "m/s"), ("sideways speed", "m/s")),
     "depth": (("depth", "m"),),
+    "echo": (("range", "m"), ("bearing", "rad")),
 }
 
 

@@ -29,6 +29,7 @@ from auvest.filters import Aukf, GaussianFilter, RobustEkf, RobustUkf, RunResult
 from auvest.intervals import CovarianceBudget, FixedInterval, IntervalPolicy, MahalanobisInterval
 from auvest.logs import LogError, LogFolder, Stream, merge
 from auvest.logs.changed import ChangedLog, columns_changed
+from auvest.logs.findings import Finding
 from auvest.logs.reader import Rows
 from auvest.models import (
     ConstantAcceleration,
@@ -52,7 +53,7 @@ _STEPS = 32768
 #: The columns that sources need, in the order in which they take them.
 _LEADERS = ("time_s", "source", "x_m", "y_m")
 #: Files of which a line that is too late makes all after it wrong.
-_REQUIRED = ("odometry.csv", "compass.csv", "leaders.csv")
+_REQUIRED = ("odometry.csv", "compass.csv", "leaders.csv", "plans.csv")
 #: So many steps without a line in any file are no log any more.
 _STEPS_WITHOUT_LINE = 5_000_000
 
@@ -86,6 +87,8 @@ class Replay(ABC):
     listener: Callable[[GaussianFilter, Rows, Mapping[str, Any]], None] | None = None
     #: Whether the state has a depth.
     spatial = False
+    #: Files with times beside those that every replay reads.
+    _own_files: tuple[str, ...] = ()
     #: Gets the same, to go back over it.
     smoothing: Smoothing | None = None
     _filter: GaussianFilter
@@ -108,7 +111,9 @@ class Replay(ABC):
             sensor: Thinning(every_s) for sensor, every_s in self.instruments.every_s.items()
         }
         reorder_s = settings.log.reorder_s
-        names = [*self.instruments.names, *_REQUIRED, "depth.csv", "truth.csv"]
+        names = [
+            *self.instruments.names, *self._own_files, *_REQUIRED, "depth.csv", "truth.csv",
+        ]  # fmt: skip
         self.streams = {
             name: Stream(log[name], reorder_s=reorder_s, required=name in _REQUIRED)
             for name in dict.fromkeys(names)
@@ -149,6 +154,10 @@ class Replay(ABC):
                 self._sources.forget(limit - self._late_s)
                 self.instruments.depths.forget(limit - self._late_s)
                 self.instruments.source_depths.forget(limit - self._late_s)
+
+    def findings(self) -> list[Finding]:
+        """Say what the filter itself is to be blamed for, at the end."""
+        return []
 
     def _with_places(self, batch: Batch) -> Batch:
         """Say where the sources of the measurements were, while that is known."""
@@ -941,6 +950,21 @@ def _fill(
 
 def replay_of(log: LogFolder, settings: Settings, filter_name: FilterName) -> Replay:
     """Make the replay that a log is for."""
+    from auvest.replay.slat import Companion  # here, because it is made of what stands above
+
+    family = registry.filter_named(filter_name).family
+    if log.echoing != (family == "slat"):
+        fitting = [
+            name for name in registry.replayable()
+            if (registry.FILTERS[name].family == "slat") == log.echoing
+        ]  # fmt: skip
+        has = "echoes of masters" if log.echoing else "no echoes of masters"
+        raise ValueError(f"filter {filter_name}: this log has {has}; take {', '.join(fitting)}")
+    if log.echoing:
+        return Companion(log, settings, filter_name)
+    for key in ("sigma_position_m", "sigma_heading_rad"):
+        if getattr(settings.start, key) == 0:
+            raise ValueError(f"[start] {key} must be positive for filter {filter_name}")
     return (Tracker if log.tracking else Localiser)(log, settings, filter_name)
 
 

@@ -150,6 +150,8 @@ class Residuals:
         self.unused: Counter[tuple[int, str]] = Counter()  # by source and outcome
         self.lines: Counter[int] = Counter()  # by source
         self.sensors: Counter[str] = Counter()
+        self.judged = 0  # echoes that a filter of masters took or refused
+        self.refused = 0
         self.ranges = 0
         self.lost = 0  # ranges until the first that told where the craft is
         self.convergence = ""
@@ -163,6 +165,9 @@ class Residuals:
         self.recoveries += int(measured["recovered"].sum())
         rows = {**measured, "range_m": batch.ranges_m}
         self._samples.add(rows)
+        echoes = measured["sensor"] == "echo"
+        self.refused += int((echoes & (measured["outcome"] == tables.REJECTED)).sum())
+        self.judged += int((echoes & ~np.isin(measured["outcome"], tables.UNUSED)).sum())
         self.sensors.update(measured["sensor"].tolist())
         for source in np.unique(measured["source"]).tolist():
             mine = measured["source"] == source
@@ -229,11 +234,11 @@ def _expected(rows: Columns) -> tuple[float, float]:
 
 def truncated_moments(numbers: int, limit: float) -> tuple[float, float]:
     """Mean and standard deviation of a chi-square value of one or two numbers below a limit."""
-    from scipy import stats  # here, because it is slow to import
+    from scipy.special import chdtr  # here, because it is slow to import
 
-    inside = stats.chi2.cdf(limit, numbers)
-    mean = numbers * stats.chi2.cdf(limit, numbers + 2) / inside
-    square = numbers * (numbers + 2) * stats.chi2.cdf(limit, numbers + 4) / inside
+    inside = chdtr(numbers, limit)
+    mean = numbers * chdtr(numbers + 2, limit) / inside
+    square = numbers * (numbers + 2) * chdtr(numbers + 4, limit) / inside
     return float(mean), math.sqrt(float(square - mean * mean))
 
 
@@ -241,7 +246,7 @@ def findings(residuals: Residuals) -> list[Finding]:
     """Say what the innovations of a replay show, without asking why."""
     rows = residuals.rows()
     count = len(rows["nis"])
-    found = _unused(residuals)
+    found = _unused(residuals) + _refused(residuals)
     if count < FEW:
         return found
     inside = within(rows)
@@ -279,9 +284,22 @@ def findings(residuals: Residuals) -> list[Finding]:
     return found + _apart(rows, inside)
 
 
+def _refused(residuals: Residuals) -> list[Finding]:
+    """Find echoes that the gate has kept out; particles have no NIS to be judged by."""
+    share = residuals.refused / max(residuals.judged, 1)
+    if residuals.judged < FEW or share <= BEYOND_DOUBTFUL:
+        return []
+    message = f"the gate refused {100 * share:.0f} % of {residuals.judged} echoes"
+    verdict: Verdict = "not_trusted" if share > BEYOND_NOT_TRUSTED else "doubtful"
+    return [finding("innovations", message, verdict=verdict)]
+
+
 def _unused(residuals: Residuals) -> list[Finding]:
     """Find measurements that no filter was given."""
-    files = {"range": "ranges.csv", "fix": "fixes.csv", "position": "positions.csv"}
+    files = {
+        "range": "ranges.csv", "fix": "fixes.csv", "position": "positions.csv",
+        "echo": "echoes.csv",
+    }  # fmt: skip
     file = next((files[one] for one in files if residuals.sensors[one]), "ranges.csv")
     lines = sum(residuals.lines.values())
     found = []
@@ -395,6 +413,8 @@ def health(residuals: Residuals, found: Iterable[Finding]) -> Health:
     if verdict == "sound":
         few = f"only {count} measurements: hardly anything to judge by"
         reasons = ["innovations are as large as the settings say" if count >= FEW else few]
+        if count == 0 and residuals.judged:
+            reasons = [f"the gate refused {residuals.refused} of {residuals.judged} echoes"]
     if count == 0:
         return Health(
             verdict, reasons[0], 0, None, None, None, None, None, residuals.recoveries, [], [], []

@@ -155,6 +155,7 @@ def rows(result: Result) -> list[tuple[str, str]]:
         ("dead reckoning alone, RMSE", _metres(n["dead_reckoned_rmse_m"])),
         ("truth within 3 sigma", _share(n["inside_3_sigma"])),
         *_smoothed(n),
+        *_masters(n),
         ("held-out measurements, RMSE", _metres(n["held_out_rmse_m"])),
         ("NIS, mean", _nis(n)),
         ("NIS within three sigma, mean", _nis_within(health)),
@@ -181,6 +182,16 @@ def _smoothed(numbers: dict[str, Any]) -> list[tuple[str, str]]:
         (f"{what}: largest error", _metres(own["max_error_m"])),
         (f"{what}: truth within 3 sigma", _share(own["inside_3_sigma"])),
     ]
+
+
+def _masters(numbers: dict[str, Any]) -> list[tuple[str, str]]:
+    made = []
+    for source, own in numbers.get("masters", {}).items():
+        made.append((f"master {source}: position RMSE", _metres(own["rmse_m"])))
+        made.append(
+            (f"master {source}: seen from the slave, RMSE", _metres(own["relative_rmse_m"]))
+        )
+    return made
 
 
 def _metres(value: float | None) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -23,9 +23,17 @@ from auvest.replay.samples import Samples
 from auvest.replay.shown import Shown
 from auvest.replay.smoothing import Smoothing
 from auvest.replay.tally import Tally
+from auvest.replay.thinning import Spacing
 
 #: ``progress(done, total)`` in bytes of the log.
 ProgressCallback = Callable[[int, int], None]
+
+#: What a replay can write beside results.json: pages, tables, and tracks as TUM text.
+PAGES = ("report", "figure")
+TABLES = ("estimates", "measurements", "errors", "masters")
+WRITTEN = (*PAGES, *TABLES, "tracks")
+#: How tables are written.
+FORMATS = ("parquet", "csv")
 
 
 @dataclass(frozen=True)
@@ -95,6 +103,9 @@ def replay(
     causes: bool = True,
     smooth: bool = False,
     lag_s: float | None = None,
+    write: Collection[str] = WRITTEN,
+    formats: Collection[str] = FORMATS[:1],
+    every_s: float = 0.0,
 ) -> Result:
     """Replay a log.
 
@@ -107,8 +118,8 @@ def replay(
     filter_name : str, optional
         The filter; default: that of the settings, else robust-ekf for ranges and ukf for fixes.
     folder : Path, optional
-        Where the tables go: estimates, measurements and errors as CSV and Parquet, trajectory.tum
-        and truth.tum. Nothing is written without it.
+        Where tables and tracks go: estimates, measurements, errors and, of masters, masters;
+        trajectory.tum and truth.tum. Nothing is written without it.
     progress : callable, optional
         Called with the bytes of the log that are read, and all.
     causes : bool
@@ -118,6 +129,13 @@ def replay(
         track ``smoothed.tum``.
     lag_s : float, optional
         With ``smooth``: each estimate knows what came within this time after it, s; default: all.
+    write : collection of str
+        Which of :data:`WRITTEN`; default: all. Without "report" and "figure", which others make of
+        the result, it has no rows for them.
+    formats : collection of {"parquet", "csv"}
+        How tables are written.
+    every_s : float
+        Of estimates, errors, masters and tracks one row in so many seconds is written; 0: all.
 
     Returns
     -------
@@ -134,6 +152,12 @@ def replay(
     """
     if lag_s is not None and not (smooth and 0 <= lag_s < math.inf):
         raise ValueError(f"lag_s must be finite, not negative, and with smooth, not {lag_s}")
+    for kind, given, known in (("write", write, WRITTEN), ("formats", formats, FORMATS)):
+        for one in given:
+            if one not in known:
+                raise ValueError(f"{kind} must be of {', '.join(known)}, not {one!r}")
+    if not 0 <= every_s < math.inf:
+        raise ValueError(f"every_s must be finite and not negative, not {every_s}")
     name = checks.filter_of(log, settings, filter_name)
     origin = local_origin(log)
     local = shifted(log, origin)
@@ -144,9 +168,12 @@ def replay(
     errors = Samples(tables.ERRORS + (tables.SMOOTHED_ERRORS if smooth else ()))
     columns = tables.MEASUREMENTS + tables.SHOWN
     measurements, outliers, shown = Samples(columns), Samples(columns), Shown()
+    drawn = bool({*PAGES} & {*write})
     interrupted = False
+    if smooth and log.echoing:
+        raise ValueError(f"a replay of echoes cannot be smoothed: filter {name} has no way back")
     with ExitStack() as stack:
-        files = _open(folder, stack, smooth=smooth)
+        files = _open(folder, stack, smooth, write, formats, every_s)
         if smooth:
             engine.smoothing = stack.enter_context(Smoothing(folder, lag_s))
         held = stack.enter_context(HeldInterrupts())
@@ -158,13 +185,14 @@ def replay(
                 with held:  # so that all tables and figures are of the same rows
                     residuals.add(batch)
                     tally.add(batch)
-                    for write in files:
-                        write(batch)
-                    estimates.add(batch.estimates)
-                    errors.add(batch.errors)
-                    measured = shown.of(batch)
-                    measurements.add(measured)
-                    outliers.add(_outliers(measured))
+                    for put in files:
+                        put(batch)
+                    if drawn:
+                        estimates.add(batch.estimates)
+                        errors.add(batch.errors)
+                        measured = shown.of(batch)
+                        measurements.add(measured)
+                        outliers.add(_outliers(measured))
                 if progress is not None:
                     progress(engine.bytes_read, engine.bytes)
 
@@ -175,7 +203,8 @@ def replay(
             else:
                 interrupted = _go_forward(engine, engine.smoothing, held, progress)
                 take(engine.smoothing.batches())
-            if folder is not None and "truth.csv" in log:
+            found += engine.findings()
+            if folder is not None and "tracks" in write and "truth.csv" in log:
                 _write_truth(log, folder, stack)
             if not interrupted:
                 found += checks.innovations(local, settings, name, residuals, found, causes=causes)
@@ -184,6 +213,8 @@ def replay(
     numbers = tally.numbers()
     if smooth:
         numbers["smoothed"] = {"lag_s": lag_s, **tally.smoothed()}
+    if log.echoing:
+        numbers["masters"] = tally.masters()
     numbers["origin_m"] = None if origin is None else list(origin)
     earth = log.frame.origin
     numbers["origin_deg"] = None if earth is None else list(earth)
@@ -227,27 +258,44 @@ def _go_forward(
 
 
 def _open(
-    folder: Path | None, stack: ExitStack, *, smooth: bool
+    folder: Path | None,
+    stack: ExitStack,
+    smooth: bool,
+    write: Collection[str],
+    formats: Collection[str],
+    every_s: float,
 ) -> list[Callable[[tables.Batch], None]]:
+    """Open what is written of each batch."""
     if folder is None:
         return []
     from auvest.replay.sink import TableFiles, TumFile  # here, because pyarrow takes long to import
 
-    tum = stack.enter_context(TumFile(folder / "trajectory.tum"))
-    parts = {
-        name: stack.enter_context(TableFiles(folder, name))
-        for name in ("estimates", "measurements", "errors")
-    }
+    made: list[Callable[[tables.Batch], None]] = []
 
-    def write(batch: tables.Batch) -> None:
-        for name, part in parts.items():
-            part.write(getattr(batch, name))
-        tum.write(batch.estimates)
+    def table(name: str) -> None:
+        file = stack.enter_context(TableFiles(folder, name, formats))
+        spacing = Spacing(0.0 if name == "measurements" else every_s)
 
-    if not smooth:
-        return [write]
-    smoothed = stack.enter_context(TumFile(folder / "smoothed.tum", prefix="smoothed_"))
-    return [write, lambda batch: smoothed.write(batch.estimates)]
+        def put(batch: tables.Batch) -> None:
+            rows = getattr(batch, name)
+            if rows is not None:
+                file.write(spacing.kept(rows))
+
+        made.append(put)
+
+    def track(name: str, prefix: str) -> None:
+        file = stack.enter_context(TumFile(folder / name, prefix))
+        spacing = Spacing(every_s)
+        made.append(lambda batch: file.write(spacing.kept(batch.estimates)))
+
+    for name in TABLES:
+        if name in write:
+            table(name)
+    if "tracks" in write:
+        track("trajectory.tum", "")
+        if smooth:
+            track("smoothed.tum", "smoothed_")
+    return made
 
 
 def _write_truth(log: LogFolder, folder: Path, stack: ExitStack) -> None:

@@ -24,9 +24,10 @@ BEFORE_START, AFTER_END, NO_POSITION, TOO_SHORT = UNUSED = (
 DECISIONS = np.array([ACCEPTED, DOWNWEIGHTED, REJECTED])
 #: What can become of a measurement, in the order of reports.
 OUTCOMES = (ACCEPTED, DOWNWEIGHTED, REJECTED, HELD_OUT, *UNUSED)
-#: What measured: a range, range and bearing (and elevation), a position, a velocity, a depth.
-SENSORS = ("range", "fix", "position", "velocity", "depth")
-RANGE, FIX, POSITION, VELOCITY, DEPTH = range(len(SENSORS))
+#: What measured: a range, range and bearing (and elevation), a position, a velocity, a depth, range
+#: and bearing of a master.
+SENSORS = ("range", "fix", "position", "velocity", "depth", "echo")
+RANGE, FIX, POSITION, VELOCITY, DEPTH, ECHO = range(len(SENSORS))
 
 #: What is known of a pose. The heading of a craft that is tracked is its course.
 POSE = (
@@ -42,6 +43,12 @@ MEASUREMENTS = (
 #: What pages show of a measurement beside its table: the estimate at its time, where its source
 #: was, the range, and the time since the one before that was compared with a prediction.
 SHOWN = ("x_m", "y_m", "place_x_m", "place_y_m", "range_m", "interval_s")
+#: A row per step and master, of filters that track some; the errors are NaN without a truth. The
+#: relative one is that of the master's place as seen from the slave's.
+MASTERS = (
+    "time_s", "source", "x_m", "y_m", "vx_m_s", "vy_m_s", "var_x_m2", "cov_xy_m2", "var_y_m2",
+    "error_x_m", "error_y_m", "relative_error_m",
+)  # fmt: skip
 #: What is beside the estimates of a filter in space.
 SPATIAL = ("depth_m", "var_depth_m2")
 #: What is beside the estimates of a filter with several components, and by the number of
@@ -67,7 +74,8 @@ class Batch:
     ``ranges_m`` are the ranges of the measurements as the log has them, ``located`` says of those
     that were used as ranges whether the belief behind each told where on its circle the craft is.
     ``places`` are x and y of the sources of the measurements, NaN where not known.
-    ``track`` is what :mod:`auvest.replay.smoothing` needs of it.
+    ``track`` is what :mod:`auvest.replay.smoothing` needs of it; ``masters`` has ``MASTERS`` where
+    the filter tracks some.
     """
 
     estimates: Columns
@@ -77,6 +85,7 @@ class Batch:
     located: npt.NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, bool))
     places: npt.NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
     track: Any = None
+    masters: Columns | None = None
 
 
 def moved(batch: Batch, origin: tuple[float, float]) -> Batch:
@@ -94,6 +103,7 @@ def moved(batch: Batch, origin: tuple[float, float]) -> Batch:
         batch,
         estimates=shift(batch.estimates),
         errors=shift(batch.errors),
+        masters=None if batch.masters is None else shift(batch.masters),
         places=batch.places + origin,
     )
 

@@ -6,10 +6,11 @@ import math
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from auvest.metrics import chi2_bounds
 from auvest.replay import tables
-from auvest.replay.tables import Batch
+from auvest.replay.tables import Batch, Columns
 
 
 class Tally:
@@ -38,6 +39,7 @@ class Tally:
         self._nis = 0.0
         self._nis_count = 0
         self._numbers = 0
+        self._masters: dict[int, npt.NDArray[np.float64]] = {}
 
     def add(self, batch: Batch) -> None:
         """Take one batch."""
@@ -86,6 +88,33 @@ class Tally:
             inside = np.abs(x) <= 3 * errors["smoothed_sigma_x_m"]
             inside &= np.abs(y) <= 3 * errors["smoothed_sigma_y_m"]
             self._smoothed_inside += int(inside.sum())
+
+        if batch.masters is not None:
+            self._add_masters(batch.masters)
+
+    def _add_masters(self, rows: Columns) -> None:
+        """Add up rows, squares of their errors, and of the relative ones, with their counts."""
+        square = rows["error_x_m"] ** 2 + rows["error_y_m"] ** 2
+        relative = rows["relative_error_m"] ** 2
+        for source in np.unique(rows["source"]).tolist():
+            mine = rows["source"] == source
+            sums = [float(mine.sum())]
+            for values in (square[mine], relative[mine]):
+                known = values[~np.isnan(values)]
+                sums += [float(known.sum()), float(len(known))]
+            before = self._masters.get(source, np.zeros(5))
+            self._masters[source] = before + sums
+
+    def masters(self) -> dict[str, dict[str, Any]]:
+        """Give the figures of each master, by its number; RMSE None without a truth."""
+        return {
+            str(source): {
+                "estimates": int(rows),
+                "rmse_m": self._root(square, int(count)),
+                "relative_rmse_m": self._root(relative, int(both)),
+            }
+            for source, (rows, square, count, relative, both) in sorted(self._masters.items())
+        }
 
     def numbers(self) -> dict[str, Any]:
         """All figures by name; None where there is nothing to compute one from."""

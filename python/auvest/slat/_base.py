@@ -572,6 +572,7 @@ class SlatFilter(Steps):
         sonar: Sonar = SONAR,
         dtype: npt.DTypeLike = "float64",
         seed: int = 0,
+        stream: int = 0,
         settings: Mapping[str, Any] | None = None,
         **parameters: Any,
     ) -> None:
@@ -586,12 +587,13 @@ class SlatFilter(Steps):
         require_heading(self._sonar, self._motion)
         self._settings = {**(settings or {}), **self._as_params(parameters)}
         seed = as_integer("seed", seed, 0, 2**64 - 1)
+        stream = as_integer("stream", stream, 0, 2**64 - 1)
         n = self._motion.pose_states
         state = as_array("x0", x0, (n,), self._dtype)
         covariance = as_covariance("P0", P0, n, self._dtype, definite=False)
         self._require_local("x0", state)
         self._prepare()
-        self._random = _core.Random(seed)
+        self._random = _core.Random(seed, stream)
         self._status = Status.ok
         try:
             self._core_steps.reset(state, covariance, self._random)

@@ -94,8 +94,8 @@ class Slatf(ParticleSlatFilter):
         Instruction set; default: the widest of :func:`available_lanes`. The bits are the same.
     dtype : {"float64", "float32"}
         Precision; float32 gives the bits of the filter on the vehicle.
-    seed : int
-        Of the filter's random numbers, 0 to 2^64 - 1.
+    seed, stream : int
+        Of the filter's random numbers, 0 to 2^64 - 1: streams of one seed have none in common.
 
     Raises
     ------

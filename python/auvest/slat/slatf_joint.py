@@ -24,7 +24,7 @@ class SlatfJoint(ParticleSlatFilter):
 
     Parameters
     ----------
-    x0, P0, motion, master, sonar, resampling, resample_below, dtype, seed
+    x0, P0, motion, master, sonar, resampling, resample_below, dtype, seed, stream
         As for :class:`Slatf`.
     gate, recover_after, recover_of, fastest_m_s, forget_after_s, rebirth_velocity_m_s, \
 rebirth_acceleration_m_s2, longest_step_s

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from auvest import (
     ConstantAcceleration,
@@ -29,6 +28,10 @@ from auvest import (
     UnicycleMotion,
 )
 from auvest._arguments import Floats
+from auvest.importers.robots import DURATION_S, GAP_S, TRUTH_GAP_S  # noqa: F401 (the page names it)
+from auvest.importers.sets import robots_of_mrclam6
+from auvest.replay.readings import Held
+from auvest.replay.slat import first_seen
 from auvest.reproduce.ticks import Ticks
 from auvest.slat import OverconfidenceWarning
 
@@ -36,14 +39,8 @@ DEFAULT_RUNS = 24
 DEFAULT_SEED = 1
 PARTICLES = 100
 
-ROBOTS = (1, 2, 3, 4, 5)
 FILES = ("groundtruth.csv", "odometry.csv", "sightings.csv")
 
-#: A track: sightings of one robot by another without a longer gap, of at least that duration.
-GAP_S = 6.0
-DURATION_S = 15.0
-#: Truth is interpolated between samples that are at most so far apart.
-TRUTH_GAP_S = 0.35
 #: Between sightings the readings are taken in equal steps of about this length.
 STEP_S = 0.1
 
@@ -148,28 +145,12 @@ class Recording:
 
     def __init__(self, folder: Path) -> None:
         check(data=folder)
-        truth, odometry, sightings = (
-            np.genfromtxt(folder / "mrclam6" / name, delimiter=",", skip_header=1) for name in FILES
-        )
-        self._truth = {robot: truth[truth[:, 1] == robot][:, [0, 2, 3, 4]] for robot in ROBOTS}
-        self._odometry = {
-            robot: odometry[odometry[:, 1] == robot][:, [0, 2, 3]] for robot in ROBOTS
-        }
-        self._sightings = sightings
+        self._robots = robots_of_mrclam6(folder / "mrclam6")
 
     def tracks(self, gap_s: float = GAP_S, duration_s: float = DURATION_S) -> list[Track]:
         """Cut the sightings into tracks, where both robots' truth is known."""
-        result = []
-        for slave in ROBOTS:
-            for master in ROBOTS:
-                seen = (self._sightings[:, 1] == slave) & (self._sightings[:, 2] == master)
-                echoes = self._sightings[seen][:, [0, 3, 4]]
-                known = self._has_truth(slave, echoes[:, 0]) & self._has_truth(master, echoes[:, 0])
-                echoes = echoes[known]
-                for run in np.split(echoes, np.flatnonzero(np.diff(echoes[:, 0]) > gap_s) + 1):
-                    if len(run) and run[-1, 0] - run[0, 0] >= duration_s:
-                        result.append(self._track(slave, master, run))
-        return result
+        cut = self._robots.tracks(gap_s, duration_s)
+        return [self._track(slave, master, echoes) for slave, master, echoes in cut]
 
     def drift(self) -> tuple[float, float]:
         """Measure the drift of calibrated dead reckoning over all robots.
@@ -181,19 +162,18 @@ class Recording:
             ``DRIFT_S``, both over the square root of that time.
         """
         errors = []
-        for robot in ROBOTS:
-            starts = np.arange(
-                self._odometry[robot][0, 0], self._truth[robot][-1, 0] - DRIFT_S, DRIFT_S
-            )
+        for robot, truth in self._robots.truth.items():
+            begin_s = self._robots.odometry[robot][0, 0]
+            starts = np.arange(begin_s, truth[-1, 0] - DRIFT_S, DRIFT_S)
             for start in starts:
                 time_s = start + STEP_S * np.arange(round(DRIFT_S / STEP_S) + 1)
-                if not self._has_truth(robot, time_s).all():
+                if not self._robots.has_truth(robot, time_s).all():
                     continue
-                truth = self._pose(robot, time_s[[0, -1]])
-                end = DeadReckoning(truth[0], np.zeros((3, 3)), motion=MOTION)
+                poses = self._robots.pose(robot, time_s[[0, -1]])
+                end = DeadReckoning(poses[0], np.zeros((3, 3)), motion=MOTION)
                 end.run(time_s, self._readings(robot, time_s))
-                gap = end.x - truth[1]
-                along = gap[0] * np.cos(truth[0, 2]) + gap[1] * np.sin(truth[0, 2])
+                gap = end.x - poses[1]
+                along = gap[0] * np.cos(poses[0, 2]) + gap[1] * np.sin(poses[0, 2])
                 errors.append((along, _wrap(gap[2])))
         along, heading = np.std(errors, axis=0) / DRIFT_S**0.5
         return float(along), float(heading)
@@ -212,32 +192,17 @@ class Recording:
             z_time_s=echoes[1:, 0],
             z=echoes[1:, 1:],
             first=echoes[0, 1:],
-            slave_truth=self._pose(slave, time_s),
-            master_truth=self._pose(master, time_s)[:, :2],
+            slave_truth=self._robots.pose(slave, time_s),
+            master_truth=self._robots.pose(master, time_s)[:, :2],
         )
-
-    def _has_truth(self, robot: int, time_s: Floats) -> npt.NDArray[np.bool_]:
-        known = self._truth[robot][:, 0]
-        after = np.searchsorted(known, time_s)
-        inside = (after > 0) & (after < len(known))
-        after = np.clip(after, 1, len(known) - 1)
-        return inside & (known[after] - known[after - 1] <= TRUTH_GAP_S)
-
-    def _pose(self, robot: int, time_s: Floats) -> Floats:
-        truth = self._truth[robot]
-        columns = (truth[:, 1], truth[:, 2], np.unwrap(truth[:, 3]))
-        return np.column_stack([np.interp(time_s, truth[:, 0], column) for column in columns])
 
     def _readings(self, robot: int, time_s: Floats) -> Floats:
         """Means over each interval of commands that hold until the next."""
-        odometry = self._odometry[robot]
-        changes = np.append(odometry[:, 0], max(odometry[-1, 0], time_s[-1]) + 1)
-        means = []
-        for column, (factor, offset) in enumerate(CALIBRATION, start=1):
-            integral = np.append(0, np.cumsum(odometry[:, column] * np.diff(changes)))
-            at = np.interp(time_s, changes, integral)
-            means.append(factor * np.diff(at) / np.diff(time_s) + offset)
-        return np.column_stack(means)
+        rows = self._robots.odometry[robot]
+        commands = Held(2)
+        commands.add(rows[:, 0], rows[:, 1:])
+        factors, offsets = zip(*CALIBRATION, strict=True)
+        return commands.means(time_s, factors) + offsets
 
 
 def follow(track: Track, name: str, *, seed: int = DEFAULT_SEED) -> Path2D:
@@ -255,26 +220,23 @@ def follow(track: Track, name: str, *, seed: int = DEFAULT_SEED) -> Path2D:
         )
     else:
         filter_ = EkfSlat(start, none, master=MASTER if name == "ekf_slat" else ONE_MODEL, **common)
-    filter_.add_master(*first_seen(start, track.first))
+    filter_.add_master(*first_master(track))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", OverconfidenceWarning)  # only means are compared
         run = filter_.run(track.time_s, track.u, z=track.z, z_time_s=track.z_time_s)
     return Path2D(slave=run.x[:, :2], master=run.masters_x[:, 0, :2])
 
 
-def first_seen(pose: Floats, z: Floats) -> tuple[Floats, Floats]:
-    """Give the belief (6,), (6, 6) of a master that is first seen from a known pose."""
-    direction = pose[2] + z[1]
-    ahead = np.array([np.cos(direction), np.sin(direction)])
-    aside = np.array([-ahead[1], ahead[0]])
-    state = np.zeros(6)
-    state[:2] = pose[:2] + z[0] * ahead
-    covariance = np.diag(
-        np.repeat([0, BIRTH_VELOCITY_M_S, BIRTH_ACCELERATION_M_S2], 2).astype(float) ** 2
+def first_master(track: Track) -> tuple[Floats, Floats]:
+    """Give the belief (6,), (6, 6) of the master when it is first seen."""
+    return first_seen(
+        track.slave_truth[0],
+        np.zeros((3, 3)),
+        track.first,
+        SONAR,
+        velocity_m_s=BIRTH_VELOCITY_M_S,
+        acceleration_m_s2=BIRTH_ACCELERATION_M_S2,
     )
-    covariance[:2, :2] = SONAR.sigma_range_m**2 * np.outer(ahead, ahead)
-    covariance[:2, :2] += (z[0] * SONAR.sigma_bearing_rad) ** 2 * np.outer(aside, aside)
-    return state, covariance
 
 
 @dataclass(frozen=True)

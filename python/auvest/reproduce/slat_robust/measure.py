@@ -255,7 +255,7 @@ def real_filter(name: str, track: real.Track, seed: int) -> SlatFilter:
         )
     else:
         filter_ = Slatf(start, none, particles=PARTICLES, seed=seed, **options)
-    x, P = real.first_seen(start, track.first)
+    x, P = real.first_master(track)
     for i in range(2, 6):
         name_of = "rebirth_velocity_m_s" if i < 4 else "rebirth_acceleration_m_s2"
         P[i, i] = options[name_of] ** 2
