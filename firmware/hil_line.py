@@ -27,7 +27,6 @@ from pathlib import Path
 from auvest.board import Board, SerialLine, WaitsForInput
 from auvest.firmware import hil, simulator
 from auvest.firmware.hil_bench import Bench, bench
-from auvest.firmware.hil_record import record_of
 from auvest.logs import LogFolder
 from auvest.models._compile import find_compiler
 from auvest.replay import Settings, find_settings
@@ -205,7 +204,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1, help="(default: 1)")
     given = parser.parse_args()
     settings = find_settings(given.config) if given.config else Settings()
-    record = record_of(LogFolder(given.log), settings, given.filter, rows=given.rows)
+    record = hil.record_of(LogFolder(given.log), settings, given.filter, rows=given.rows)
     noise = Noise(given.damage, given.seed)
     with (
         tempfile.TemporaryDirectory() as name,

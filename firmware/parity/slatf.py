@@ -341,14 +341,8 @@ class Record:
             master=np.concatenate([part["master"] for part in echoes]),
             changes=np.array([step.changes for step in steps]) if self.planned else None,
         )
-        return SlatRecord(
-            self.filter("scalar"),
-            self.world.slave["x"],
-            symmetric(self.world.slave["P"], self.motion.pose_states),
-            self.seed,
-            [*(Newcomer(one["x"], symmetric(one["P"], 6)) for one in told), *played],
-            self.room,
-        )
+        masters = [Newcomer(one["x"], symmetric(one["P"], 6)) for one in told]
+        return SlatRecord(self.filter("scalar"), [*masters, *played], self.room)
 
     def to_bytes(self) -> bytes:
         """Return the record as the replay programs read it."""

@@ -5,6 +5,7 @@ body is a name and fields. A sketch says why it has started, names the columns o
 sends them::
 
     $BOOT,17,1*...                             how many starts, and why this one
+    $RESUME,9,...*...                          from which checkpoint it goes on, if it keeps any
     $COLUMNS,AUV,sample#,time_s,x_m,...*...    of the lines that begin with AUV
     $AUV,1,0.500000,3e4ccccd,...*...
 
@@ -64,6 +65,23 @@ class Boot:
         causes = ("power came on", "its reset pin", "the supply was too low", "its watchdog")
         said = [text for bit, text in enumerate(causes) if self.cause >> bit & 1]
         return " and ".join(said) or "unknown: its bootloader clears the cause"
+
+
+@dataclass(frozen=True)
+class Resumed:
+    """The board goes on from a checkpoint.
+
+    Attributes
+    ----------
+    sequence : int
+        Its number; 0: there was none to go on from.
+    least_s, most_s : float
+        Bounds of its age, s.
+    """
+
+    sequence: int
+    least_s: float
+    most_s: float
 
 
 def frame(body: str) -> str:
@@ -157,13 +175,13 @@ class Reader:
         self.others: set[str] = set()
         self._whole: frozenset[str] = frozenset()
 
-    def read(self, line: str) -> Row | Boot | None:
+    def read(self, line: str) -> Row | Boot | Resumed | None:
         """Read a line without its end.
 
         Returns
         -------
-        dict, Boot or None
-            One sample, or that the board has started; None for everything else.
+        dict, Boot, Resumed or None
+            One sample, that the board has started, or from what; None for everything else.
 
         Raises
         ------
@@ -180,6 +198,8 @@ class Reader:
             if len(cells) != 2 or not all(map(_COUNT.fullmatch, cells)):
                 raise LineError(f"not a start of the board: {line!r}")
             return Boot(*map(int, cells))
+        if kind == "RESUME":
+            return _resumed(line, cells)
         if kind == "COLUMNS":
             self._describe(line, *cells)
         elif kind == self.kind:
@@ -210,6 +230,18 @@ class Reader:
             return {name: _value(cell, whole=name in self._whole) for name, cell in pairs}
         except ValueError:
             raise LineError(f"not a number in {line!r}") from None
+
+
+def _resumed(line: str, cells: list[str]) -> Resumed:
+    """Read sequence, seconds, sum, least and most age; a sketch may add to them."""
+    if (
+        len(cells) < 5
+        or not _COUNT.fullmatch(cells[0])
+        or not all(map(_BITS.fullmatch, cells[3:5]))
+    ):
+        raise LineError(f"not what a board resumes from: {line!r}")
+    least_s, most_s = (_value(cell, whole=False) for cell in cells[3:5])
+    return Resumed(int(cells[0]), least_s, most_s)
 
 
 def _checksum(body: str) -> int:

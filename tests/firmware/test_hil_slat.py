@@ -20,17 +20,10 @@ pytest_plugins = ["board_support"]
 
 RECORDS = {**all_records(), "slatf-shared": shared_record()}
 ON_CHIP = {**all_records(chip=True), "slatf-shared": shared_record()}
-#: Beside the bench itself the ATmega2560 has room for these many of the paper's particles.
-AVR_PARTICLES = 32
 
 
 def record_for(target, name):
-    if target != "atmega2560":
-        return RECORDS[name].for_bench()
-    record = ON_CHIP[name]
-    if record.kind in ("slatf1", "slatf2") and record.particles > AVR_PARTICLES:
-        record = replace(record, particles=AVR_PARTICLES)
-    return record.for_bench()
+    return (ON_CHIP if target == "atmega2560" else RECORDS)[name].for_bench()
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +79,7 @@ def test_rows_are_what_a_run_does(name):
     desk = dict(zip(played.fields, played.on_desk().T, strict=True))
     assert [row.dt is None for row in played.rows[2:]] == [True] + [False] * (len(played) - 3)
     assert not desk["status"].any()
-    ran = played.start()
+    ran = record.filter("scalar")
     for newcomer in played.rows[:2]:
         ran.add_master(newcomer.x, newcomer.P)
     times = np.arange(len(steps) + 1.0)
@@ -112,11 +105,12 @@ def test_rows_are_what_a_run_does(name):
 
 def test_a_record_that_cannot_be_is_refused():
     record = RECORDS["ekf-slat"].for_bench()
-    reckoning = DeadReckoning(record.x0, record.P0, dtype="float32")
+    x0, P0 = np.zeros(2), np.eye(2)
+    reckoning = DeadReckoning(x0, P0, dtype="float32")
     with pytest.raises(ValueError, match="DeadReckoning is for the desk only"):
         replace(record, filter=reckoning)
     with pytest.raises(ValueError, match="must be in float32, not in float64"):
-        replace(record, filter=slat.EkfSlat(record.x0, record.P0))
+        replace(record, filter=slat.EkfSlat(x0, P0))
     with pytest.raises(ValueError, match="room is 1: it must be from the 2 masters told to the 4"):
         replace(record, room=1)
     births = RECORDS["slatf2-births"]

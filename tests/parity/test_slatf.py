@@ -23,7 +23,7 @@ from firmware.parity.slatf import all_records, fields_of, paper_echoes
 from firmware.parity.targets import AVR_PARTICLES, PARTICLES, SLATF_TARGETS
 from tests.parity.comparison import asked_for, differing_bits
 from tests.parity.slatf_python_leg import replay_in_python
-from tests.slow import SLOW
+from tests.slow import ASKED, SLOW
 
 #: Particles come in blocks (auvest/particles/lanes.hpp).
 BLOCK = 16
@@ -36,8 +36,8 @@ PAPER = ("slatf1", "slatf2")
 RECORDS = all_records()
 ON_CHIP = all_records(chip=True)
 
-#: Echoes of the paper's scenario on the ATmega2560 with -O2; the IDE's options get all 200, each
-#: half a second of its time.
+#: Echoes of the paper's scenario on the ATmega2560, each half a second of its time; where slow
+#: tests are asked for the IDE's options get all 200.
 SHORT = 20
 
 
@@ -52,7 +52,7 @@ def names_for(target):
 def record_for(target, name):
     if target.machine != "avr":
         return RECORDS[name]
-    short = name in PAPER and target != IDE
+    short = name in PAPER and not (target == IDE and ASKED)
     return replace(ON_CHIP[name], world=paper_echoes(SHORT)) if short else ON_CHIP[name]
 
 
@@ -177,6 +177,7 @@ def test_the_record_is_worth_it(name, chip, wanted):
     assert rows["particles"].shape == (200, AVR_PARTICLES if chip else PARTICLES, fields_of(name))
     # 1.0 is left with few particles after nearly every echo, 2.0 after every fifth.
     assert rows["resamplings"][-1] > (150 if name == "slatf1" else 20)
+    assert rows["resamplings"][SHORT - 1] >= 3
 
 
 BOTH = [(name, False) for name in RECORDS] + [(name, True) for name in ON_CHIP]

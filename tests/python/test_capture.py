@@ -211,6 +211,22 @@ def test_a_start_of_the_board_says_why() -> None:
             Reader().read(telemetry.frame(body))
 
 
+def test_from_what_a_board_resumes() -> None:
+    """As the sketch power_cuts says it, or with less behind the age."""
+    reader = Reader()
+    line = telemetry.frame(f"RESUME,7,60,12345678,{bits(1.5)},{bits(75)}")
+    assert reader.read(line) == telemetry.Resumed(7, 1.5, 75.0)
+    assert reader.others == set()
+    for body in (
+        "RESUME",
+        "RESUME,7,60,89abcdef,3fc00000",
+        "RESUME,x,60,89abcdef,3fc00000,3fc00000",
+        "RESUME,7,60,89abcdef,1.5,75",
+    ):
+        with pytest.raises(LineError, match="not what a board resumes from"):
+            reader.read(telemetry.frame(body))
+
+
 def test_other_lines_are_no_samples() -> None:
     reader = Reader()
     for line in ("", "# bytes of RAM never used: 5000", telemetry.frame("PING,3")):
@@ -389,10 +405,16 @@ def test_a_board_that_restarts_begins_a_section(port: PortWithBoard, tmp_path: P
 
     def script(board: PortWithBoard) -> None:
         board.say(telemetry.frame("BOOT,4,1"))
+        board.say(
+            telemetry.frame(f"RESUME,0,0,{bits(0)},{bits(0)},{bits(0)},0,{bits(0)},{bits(0)}")
+        )
         board.say(HEADER)
         for k in (1, 2, 3, 3):
             board.say(sample_line(k, missing=k == 3))
         board.say(telemetry.frame("BOOT,5,8"))
+        board.say(
+            telemetry.frame(f"RESUME,7,60,89abcdef,{bits(1.5)},{bits(75)},0,{bits(0)},{bits(0)}")
+        )
         board.say(HEADER)
         for k in (1, 2):
             board.say(sample_line(k, missing=True))
@@ -408,6 +430,12 @@ def test_a_board_that_restarts_begins_a_section(port: PortWithBoard, tmp_path: P
         {"after_s": 1.5, "section": 2, "reason": "its watchdog"},
         {"after_s": 1.0, "section": 3, "reason": "not said: that line was lost"},
     ]
+    none = {"checkpoint": 0, "least_age_s": 0.0, "most_age_s": 0.0}
+    seventh = {"checkpoint": 7, "least_age_s": 1.5, "most_age_s": 75.0}
+    assert values["resumptions"] == [{"section": 1, **none}, {"section": 2, **seventh}]
+    table = capture._table({k: math.nan if v is None else v for k, v in values.items()}, "")
+    cells = [str(cell) for column in table.columns for cell in column.cells]
+    assert {"1 of 2", "the last from 1.5 to 75 s old"} <= set(cells)
     assert "the board restarted after 1.5 s" in plain(result.stderr)
     assert values["damaged_lines"] == 1  # sample 3 came twice
     assert values["missed"] == 2  # one in each of the first two sections

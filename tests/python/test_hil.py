@@ -17,16 +17,19 @@ import numpy as np
 import pyarrow.parquet as pa_parquet
 import pytest
 from test_replay import SETTINGS, increments_log
+from test_replay_slat import EXACT, sea
 from typer.testing import CliRunner
 
 import auvest
 from auvest import telemetry
 from auvest.cli import app
-from auvest.firmware import hil, hil_serial
+from auvest.firmware import hil, hil_serial, hil_slat
 from auvest.firmware.cost import registered
 from auvest.firmware.hil_bench import ANEW, Bench, answer_of, bench, row_frame
-from auvest.firmware.hil_record import Record, place_names, record_of
+from auvest.firmware.hil_record import Record, place_names
 from auvest.logs import LogFolder
+from auvest.replay import settings_from
+from auvest.replay.engine import replay_of
 from firmware.hil_line import BENCHES, Noise, served
 
 CONFIG = """[start]
@@ -53,7 +56,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def record(log: Path) -> Record:
-    return record_of(LogFolder(log), SETTINGS)
+    return hil.record_of(LogFolder(log), SETTINGS)
 
 
 def family_record(kind: type[Any], name: str, **options: Any) -> Record:
@@ -114,7 +117,50 @@ def test_the_desk_is_the_filter_in_float32(record: Record) -> None:
 
 
 def test_so_many_rows_as_are_wanted(log: Path) -> None:
-    assert len(record_of(LogFolder(log), SETTINGS, rows=7)) == 7
+    assert len(hil.record_of(LogFolder(log), SETTINGS, rows=7)) == 7
+
+
+@pytest.mark.parametrize("name", ["slatf2", "slatf-joint", "ekf-slat"])
+def test_rows_of_echoes_are_those_that_a_replay_gives_to_its_filter(
+    name: Any, tmp_path: Path
+) -> None:
+    """In float32 the same bits; masters come in when they are first heard."""
+    sea(tmp_path, sources=(7, 3))
+    options = {"slat": {"particles": 40, "max_masters": 2}, "filter": {"dtype": "float32"}}
+    settings = settings_from({**EXACT, **options})
+    record = hil.record_of(LogFolder(tmp_path), settings, name)
+    assert isinstance(record, hil_slat.SlatRecord)
+    newcomers = [k for k, row in enumerate(record.rows) if isinstance(row, hil_slat.Newcomer)]
+    assert len(newcomers) == record.room == 2
+    assert newcomers[0] > 0
+    assert max(len(row.z) for row in record.rows if isinstance(row, hil_slat.Step)) == 2
+    engine = replay_of(LogFolder(tmp_path), settings, name)
+    wanted = np.concatenate([b.estimates["y_m"] for b in engine.batches()]).astype(np.float32)
+    found = record.on_desk()[1:, record.fields.index("slave x[y]")].view(np.float32)
+    assert not record.on_desk()[:, 0].any()
+    np.testing.assert_array_equal(found[record.dt > 0], wanted)
+    few = hil.record_of(LogFolder(tmp_path), settings, name, rows=7)
+    assert len(few) == 7
+    assert len(bench(few).rows) == 8
+
+
+def test_a_log_of_echoes_on_this_computer(tmp_path: Path) -> None:
+    (tmp_path / "log").mkdir()
+    sea(tmp_path / "log")
+    settings = "[slat]\nparticles = 20\ncovariance = 'shared'\n[slave]\nsigma_speed_m_s = 0.05\n"
+    (tmp_path / "log.toml").write_text(settings)
+    done = call(str(tmp_path / "log"), "--config", str(tmp_path / "log.toml"), "--flags", "-O0",
+                "--output", str(tmp_path / "out"), "--rows", "60", "--json")  # fmt: skip
+    assert done.exit_code == 0, done.output
+    document = json.loads(done.stdout)
+    (leg,) = document["legs"]
+    assert document["filter"] == "slatf-joint"
+    assert (leg["rows"], leg["differing"]) == (60, 0)
+    table = pa_parquet.read_table(tmp_path / "out" / "host.parquet")
+    assert table["time_s"][-1].as_py() == pytest.approx(5.9, abs=0.11)
+    assert "decision" not in table.column_names
+    weights = [table[f"weight[{i}]"][-1].as_py() for i in range(20)]
+    assert sum(weights) == pytest.approx(1, rel=1e-5)
 
 
 def test_the_names_of_a_place_are_those_of_the_core() -> None:
@@ -155,7 +201,7 @@ def test_a_record_that_cannot_be_is_refused() -> None:
 
 def test_late_measurements_of_a_log_are_played_with_their_age(log: Path) -> None:
     settings = replace(SETTINGS, ranges=replace(SETTINGS.ranges, latency_s=0.7))
-    record = record_of(LogFolder(log), settings)
+    record = hil.record_of(LogFolder(log), settings)
     assert record.filter.late_s > 0
     assert record.age is not None
     assert 0 < record.age[record.measured].max() <= record.filter.late_s

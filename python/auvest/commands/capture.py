@@ -44,7 +44,7 @@ from auvest.commands.session import Floats, Session
 from auvest.simulation import paper_aukf
 from auvest.simulation.paper_aukf import observed_positions
 from auvest.simulation.tracking import Noise, Track
-from auvest.telemetry import Boot, LineError, Reader, Row
+from auvest.telemetry import Boot, LineError, Reader, Resumed, Row
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -146,6 +146,25 @@ class Restart:
     reason: str
 
 
+@dataclass(frozen=True)
+class Resumption:
+    """A section goes on from a checkpoint of the board.
+
+    Attributes
+    ----------
+    section : int
+    checkpoint : int
+        Its sequence number; 0: there was none.
+    least_age_s, most_age_s : float
+        Bounds of its age, s.
+    """
+
+    section: int
+    checkpoint: int
+    least_age_s: float
+    most_age_s: float
+
+
 @dataclass
 class Recording:
     """What has been heard so far; every sample is on the disk as soon as it has come.
@@ -162,6 +181,8 @@ class Recording:
         When each sample of each section was asked for, in the time of who calls `hear`.
     restarts : list of Restart
         Where the board has begun anew.
+    resumptions : list of Resumption
+        From what, of a sketch that keeps checkpoints.
     damaged : int
         Lines that could not be read.
     last_damage : str
@@ -175,6 +196,7 @@ class Recording:
     rows: list[Row] = field(default_factory=list)
     triggered_s: dict[tuple[int, int], float] = field(default_factory=dict)
     restarts: list[Restart] = field(default_factory=list)
+    resumptions: list[Resumption] = field(default_factory=list)
     damaged: int = 0
     last_damage: str = ""
     awake_share: float = math.nan
@@ -198,6 +220,10 @@ class Recording:
             said = self._reader.read(line)
             if isinstance(said, Boot):
                 self._begin(said.reason)
+            elif isinstance(said, Resumed):
+                self._begin("not said: that line was lost")
+                age = said.least_s, said.most_s
+                self.resumptions.append(Resumption(self._section, said.sequence, *age))
             elif said is not None:
                 self._add(said)
         except LineError as error:
@@ -497,6 +523,7 @@ def measures(recording: Recording, *, simulated: bool) -> dict[str, Any]:
         "not_ok": _count(np.where(np.isfinite(status), status != 0, np.nan)),
         "damaged_lines": recording.damaged,
         "restarts": [asdict(restart) for restart in recording.restarts],
+        "resumptions": [asdict(resumption) for resumption in recording.resumptions],
         "duration_s": span,
         "mean_interval_s": float(recording.column("dt_s").mean()),
         "nis_mean": float(known.mean()) if known.size else math.nan,
@@ -546,6 +573,11 @@ def _table(values: dict[str, Any], source: str) -> Table:
     rows = [(name, f"{values[key]}", note) for key, name, note in counts if values[key] >= 0]
     if values["restarts"]:
         rows.append(("restarts of the board", f"{len(values['restarts'])}", "a section each"))
+    kept = [one for one in values["resumptions"] if one["checkpoint"] > 0]
+    if kept:
+        of = f"{len(kept)} of {len(values['resumptions'])}"
+        age = f"{kept[-1]['least_age_s']:.6g} to {kept[-1]['most_age_s']:.6g} s old"
+        rows.append(("starts from a checkpoint", of, f"the last from {age}"))
     if math.isfinite(values["mean_interval_s"]):
         rows.append(("mean interval / s", f"{values['mean_interval_s']:.4f}", ""))
     if math.isfinite(values["nis_mean"]):

@@ -41,9 +41,9 @@ from auvest.commands.files import write_results, write_text
 from auvest.commands.version import version
 from auvest.errors import FilterError, ModelError
 from auvest.firmware import hil
-from auvest.firmware.hil import SERIAL, TARGETS, HilError, Leg
+from auvest.firmware.hil import SERIAL, TARGETS, AnyRecord, HilError, Leg
 from auvest.firmware.hil_bench import bench
-from auvest.firmware.hil_record import Record, Words, record_of
+from auvest.firmware.hil_record import Words
 from auvest.firmware.hil_serial import LineLost
 from auvest.firmware.simulator import SimulatorError
 from auvest.firmware.sketch import SketchError
@@ -91,7 +91,7 @@ def command(
         folder = LogFolder(log, reading=settings.reading)
         name = checks.filter_of(folder, settings, filter_name)
         try:
-            record = record_of(folder, settings, name, rows=rows)
+            record = hil.record_of(folder, settings, name, rows=rows)
         except FilterError as error:
             terminal.fail(f"{shown(folder.path)}: {error}", ExitCode.FAILED)
     new = terminal.new_folder(output, "hil", force=force)
@@ -147,7 +147,11 @@ def command(
 
 
 def _write(
-    folder: Path, record: Record, desk: Words, legs: list[Leg], document: dict[str, Any]
+    folder: Path,
+    record: AnyRecord,
+    desk: Words,
+    legs: list[Leg],
+    document: dict[str, Any],
 ) -> None:
     """Write the bits of desk and targets, the report and results.json."""
     from auvest.firmware.hil_trace import write_trace  # here, because pyarrow takes long to import
@@ -166,7 +170,7 @@ def _write(
     )
 
 
-def _line(leg: Leg, record: Record) -> tuple[str, ...]:
+def _line(leg: Leg, record: AnyRecord) -> tuple[str, ...]:
     values = leg.document(record)
     time_us, awake = values["microseconds_median"], values["awake_share"]
     return (

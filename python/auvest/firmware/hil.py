@@ -11,21 +11,27 @@ import subprocess
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from auvest._headers import firmware_folder, include_folders
 from auvest.board import Board, WaitsForInput
-from auvest.firmware import simulator
+from auvest.firmware import hil_record, hil_slat, simulator
 from auvest.firmware.hil_bench import Bench, answer_of, bench
 from auvest.firmware.hil_record import Record, Words
 from auvest.firmware.hil_serial import over_serial
 from auvest.firmware.hil_slat import SlatRecord
 from auvest.firmware.package import package
 from auvest.firmware.sketch import Compiled, compile_sketch
+from auvest.logs import LogFolder
+from auvest.logs.origin import local_origin, shifted
 from auvest.models._compile import find_compiler
+from auvest.replay import checks
+from auvest.replay.config import FilterName, Settings
+from auvest.replay.engine import replay_of
+from auvest.replay.slat import Companion
 from auvest.telemetry import LineError
 
 #: Targets but for ``serial:PORT``, and how each is called.
@@ -58,6 +64,7 @@ _CLOCK_HZ = 16_000_000
 #: What only a program that hangs takes, s.
 _TIMEOUT_S = 1800
 
+AnyRecord: TypeAlias = Record | SlatRecord
 Progress = Callable[[int, int], None]
 
 
@@ -126,13 +133,13 @@ class Leg:
     microseconds: npt.NDArray[np.uint32] | None
     figures: dict[str, int] = field(default_factory=dict)
 
-    def awake_share(self, record: Record | SlatRecord) -> float | None:
+    def awake_share(self, record: AnyRecord) -> float | None:
         """Give the share of the record's time in which the filter computes, where it is known."""
         if self.microseconds is None or not record.dt.sum() > 0:
             return None
         return 1e-6 * float(self.microseconds[1:].sum()) / float(record.dt.sum(dtype=float))
 
-    def document(self, record: Record | SlatRecord) -> dict[str, Any]:
+    def document(self, record: AnyRecord) -> dict[str, Any]:
         """For JSON."""
         return {
             "target": self.target,
@@ -150,8 +157,36 @@ class Leg:
         return None if self.microseconds is None else float(np.median(self.microseconds[1:]))
 
 
+def record_of(
+    log: LogFolder,
+    settings: Settings,
+    filter_name: FilterName | None = None,
+    *,
+    rows: int | None = None,
+) -> AnyRecord:
+    """Take the rows of a log as ``auvest replay`` would give them to this filter.
+
+    Parameters
+    ----------
+    log, settings, filter_name
+        As for :func:`auvest.replay.replay`.
+    rows : int, optional
+        So many at most; default: all.
+
+    Raises
+    ------
+    ValueError
+        If the log, the settings or the filter do not fit, or there is no row.
+    """
+    name = checks.filter_of(log, settings, filter_name)
+    engine = replay_of(shifted(log, local_origin(log)), settings, name)
+    if isinstance(engine, Companion):
+        return hil_slat.record_of_replay(engine, rows)
+    return hil_record.record_of_replay(engine, rows)
+
+
 def run(
-    record: Record | SlatRecord,
+    record: AnyRecord,
     target: str,
     folder: Path,
     *,

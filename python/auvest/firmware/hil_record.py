@@ -1,7 +1,7 @@
 """What `auvest hil` plays: a filter in float32, and the rows of a record that it is given.
 
-A row is a prediction and at most one measurement. :func:`record_of` takes the rows of a log as
-``auvest replay`` gives them to the filter; :class:`Record` may also be made by hand, of any filter
+A row is a prediction and at most one measurement. :func:`record_of_replay` takes the rows that
+``auvest replay`` gives to the filter; :class:`Record` may also be made by hand, of any filter
 with models of the registry. ``on_desk`` gives the bits that every chip must find.
 """
 
@@ -19,12 +19,8 @@ from auvest._core import Status
 from auvest._state import describe
 from auvest.errors import FilterError
 from auvest.filters import GaussianFilter
-from auvest.logs import LogFolder
-from auvest.logs.origin import local_origin, shifted
 from auvest.models import MeasurementModel
-from auvest.replay import checks
-from auvest.replay.config import FilterName, Settings
-from auvest.replay.engine import replay_of
+from auvest.replay.engine import Replay
 
 Words = npt.NDArray[np.uint32]
 _Numbers = npt.NDArray[np.float32]
@@ -67,7 +63,7 @@ class Record:
         filter_ = self.filter
         if filter_.dtype != np.float32:
             raise ValueError(f"the filter must be in float32, not in {filter_.dtype}")
-        columns = [self.sensor, self.dt, self.z, self.input, self.place]
+        columns: list[npt.NDArray[Any]] = [self.sensor, self.dt, self.z, self.input, self.place]
         if self.age is not None:
             columns.append(self.age)
             if filter_.late_s == 0:
@@ -146,32 +142,17 @@ class Record:
         return np.array(lines)
 
 
-def record_of(
-    log: LogFolder,
-    settings: Settings,
-    filter_name: FilterName | None = None,
-    *,
-    rows: int | None = None,
-) -> Record:
-    """Take the rows of a log as ``auvest replay`` would give them to this filter.
-
-    Parameters
-    ----------
-    log, settings, filter_name
-        As for :func:`auvest.replay.replay`.
-    rows : int, optional
-        So many at most; default: all.
+def record_of_replay(replay: Replay, most: int | None) -> Record:
+    """Take the rows that a replay gives to its filter, so many at most.
 
     Raises
     ------
     ValueError
-        If the log, the settings or the filter do not fit, or there is no row.
+        If there are none.
     """
-    name = checks.filter_of(log, settings, filter_name)
-    engine = replay_of(shifted(log, local_origin(log)), settings, name)
-    heard = _Heard(rows)
-    engine.listener = heard
-    for _ in engine.batches():
+    heard = _Heard(most)
+    replay.listener = heard
+    for _ in replay.batches():
         if heard.enough:
             break
     return heard.record()

@@ -17,7 +17,8 @@ from auvest._core import Status
 from auvest.errors import FilterError
 from auvest.firmware.cost import literal
 from auvest.firmware.hil_record import Words, bits
-from auvest.slat import EkfSlat, ParticleSlatFilter, Slatf, SlatFilter, SlatfJoint
+from auvest.replay.slat import Companion
+from auvest.slat import EkfSlat, ParticleSlatFilter, Slatf, SlatFilter, SlatfJoint, SlatRun
 from auvest.slat.models import Imm, PiecewiseAcceleration
 
 _BEARINGS = {
@@ -112,20 +113,13 @@ class SlatRecord:
     Attributes
     ----------
     filter : Slatf, SlatfJoint or EkfSlat
-        In float32: its models and parameters; its state does not count.
-    x0, P0 : ndarray
-        Of the slave, as the filter took them.
-    seed : int
-        Of its random numbers.
+        In float32; played is one as it was at its start.
     rows : sequence of Step or Newcomer
     room : int
         Masters that the chip has room for.
     """
 
     filter: SlatFilter
-    x0: npt.NDArray[Any]
-    P0: npt.NDArray[Any]
-    seed: int
     rows: Sequence[Step | Newcomer]
     room: int
 
@@ -153,7 +147,7 @@ class SlatRecord:
     @property
     def echoes(self) -> int:
         """Most echoes at one time, at least 1."""
-        return max(1, *(len(row.z) for row in self.rows if isinstance(row, Step)))
+        return max([1, *(len(row.z) for row in self.rows if isinstance(row, Step))])
 
     @property
     def particles(self) -> int:
@@ -181,12 +175,6 @@ class SlatRecord:
     def _modes(self) -> int:
         return _MODES if isinstance(self.filter._settings["master"], Imm) else 0
 
-    def start(self) -> SlatFilter:
-        """Make the filter, at its start."""
-        models = {"motion": self.filter.motion, "sonar": self.filter.sonar, "dtype": "float32"}
-        settings = {**models, **self.filter._settings, "seed": self.seed}
-        return type(self.filter)(self.x0, self.P0, **settings)
-
     def on_desk(self) -> Words:
         """Give the bits after the start and after each row, shape (T + 1, fields).
 
@@ -195,7 +183,7 @@ class SlatRecord:
         ValueError
             If more masters are born than there is room for.
         """
-        filter_ = self.start()
+        filter_ = in_float32(self.filter)
         lines = [self._line(filter_, Status.ok)]
         for k, row in enumerate(self.rows):
             status = Status.ok
@@ -234,6 +222,55 @@ class SlatRecord:
         return np.concatenate([np.array([int(status)], np.uint32), floats])
 
 
+def in_float32(filter_: SlatFilter) -> SlatFilter:
+    """Give a filter as this one was at its start, in the precision of the chip."""
+    x0, P0, seed, stream = filter_._start
+    return type(filter_)(
+        x0,
+        P0,
+        motion=filter_.motion,
+        sonar=filter_.sonar,
+        dtype="float32",
+        seed=seed,
+        stream=stream,
+        **filter_._settings,
+    )
+
+
+def record_of_replay(replay: Companion, most: int | None) -> SlatRecord:
+    """Take the rows that a replay gives to its filter, so many at most.
+
+    Raises
+    ------
+    ValueError
+        If there are none.
+    """
+    filter_ = replay.filter
+    run, update, add_master = filter_.run, filter_.update, filter_.add_master
+    rows: list[Step | Newcomer] = []
+
+    def heard_run(time_s: npt.ArrayLike, u: npt.ArrayLike, **options: Any) -> SlatRun:
+        rows.extend(steps_of_run(time_s, u, **options))
+        return run(time_s, u, **options)
+
+    def heard_update(z: npt.ArrayLike, master: npt.ArrayLike) -> None:
+        still = np.zeros(2, np.float32)
+        rows.append(Step(None, still, None, np.asarray(z, np.float32), np.asarray(master)))
+        update(z, master)
+
+    def heard_master(x: npt.ArrayLike, P: npt.ArrayLike) -> int:
+        rows.append(Newcomer(np.asarray(x, np.float32), np.asarray(P, np.float32)))
+        return add_master(x, P)
+
+    vars(filter_).update(run=heard_run, update=heard_update, add_master=heard_master)
+    for _ in replay.batches():
+        if most is not None and len(rows) >= most:
+            break
+    if not rows:
+        raise ValueError("the log has no row for a filter")
+    return SlatRecord(in_float32(filter_), rows[:most], max(1, filter_.masters))
+
+
 def _known(row: Step, masters: int) -> npt.NDArray[np.float32] | None:
     """Give the changes for as many masters as there are."""
     if row.changes is None:
@@ -254,7 +291,8 @@ def _belief(whose: str, state: Sequence[str]) -> list[str]:
 
 def rows(record: SlatRecord) -> list[list[int]]:
     """Give the words of the start and of all rows, without their numbers."""
-    words = [_words_of(record.x0, record.P0)]
+    x0, P0, _, _ = record.filter._start
+    words = [_words_of(x0, P0)]
     for row in record.rows:
         if isinstance(row, Newcomer):
             words.append([_NEWCOMER, *_words_of(row.x, row.P)])
@@ -281,6 +319,7 @@ def places(record: SlatRecord) -> dict[str, str]:
     """Give what stands in the places of slat.hpp.in."""
     filter_ = record.filter
     settings = filter_._settings
+    _, _, seed, stream = filter_._start
     make = _made(record)
     arguments = "make_motion(), make_master(), make_params()"
     show = ["  put(out, filter.nis());"]
@@ -307,8 +346,8 @@ def places(record: SlatRecord) -> dict[str, str]:
     make += [
         f"Filter filter({arguments});",
         "const auvest::Sonar<float> sonar = make_sonar();",
-        f"constexpr uint64_t kSeed = {record.seed}ull;",
-        "auvest::math::Random random(kSeed);",
+        f"auvest::math::Random fresh() {{ return auvest::math::Random({seed}ull, {stream}ull); }}",
+        "auvest::math::Random random = fresh();",
     ]
     return {
         "MOTION": type(filter_.motion).__name__,

@@ -9,13 +9,13 @@ import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.parquet as pa_parquet
 
+from auvest.firmware.hil import AnyRecord
 from auvest.firmware.hil_record import Record, Words
-from auvest.firmware.hil_slat import SlatRecord
 
 
 def write_trace(
     path: Path,
-    record: Record | SlatRecord,
+    record: AnyRecord,
     words: Words,
     microseconds: npt.NDArray[np.uint32] | None,
 ) -> None:

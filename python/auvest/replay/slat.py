@@ -97,6 +97,11 @@ class Companion(Replay):
         self._alone = self._nameless and not self._told and not births
         self._counts = (0, 0)  # echoes refused and masters born again so far
 
+    @property
+    def filter(self) -> SlatFilter:
+        """What localises the slave and tracks the masters."""
+        return self._slat
+
     def _start(self) -> tuple[float, float, float, float]:
         for name in ("start.csv", "truth.csv"):
             if name not in self.log:

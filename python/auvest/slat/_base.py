@@ -561,6 +561,7 @@ class SlatFilter(Steps):
     _defaults: Mapping[str, Any] = {}
 
     _max_masters: int = MAX_MASTERS
+    _start: tuple[Floats, Floats, int, int]  # x0, P0, seed and stream: with all else, what it was
     _settings: dict[str, Any]  # beside motion, sonar and dtype: all that makes the filter
 
     def __init__(
@@ -592,6 +593,7 @@ class SlatFilter(Steps):
         state = as_array("x0", x0, (n,), self._dtype)
         covariance = as_covariance("P0", P0, n, self._dtype, definite=False)
         self._require_local("x0", state)
+        self._start = state, covariance, seed, stream
         self._prepare()
         self._random = _core.Random(seed, stream)
         self._status = Status.ok
