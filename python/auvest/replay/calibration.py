@@ -435,7 +435,8 @@ class _Search:
 def _held(log: LogFolder, settings: Settings, name: FilterName) -> LogFolder:
     local = shifted(log, local_origin(log))
     start = replay_of(local, settings, name).start
-    return HeldLog(local, diagnosis.LINES, start if math.isfinite(start[0]) else None)
+    lines = diagnosis.LINES
+    return HeldLog(local, lines, lines, start if math.isfinite(start[0]) else None)
 
 
 def _compared(batch: Batch) -> Columns:
