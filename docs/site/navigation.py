@@ -30,6 +30,7 @@ PAGES = {
         "models",
         "logs",
         "importers",
+        "sweeps",
         "On a microcontroller </firmware/README>",
     ],
     "Algorithms": [
