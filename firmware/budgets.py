@@ -375,13 +375,15 @@ def _pilot_record() -> bytes:
 # ---- Measure -------------------------------------------------------------------------------------
 
 
-def measure(output: Path) -> list[Row]:
+def measure(output: Path, compiled: Mapping[str, Compiled] | None = None) -> list[Row]:
     """Compile all programs for the ATmega2560 and run them on the simulated board.
 
     Parameters
     ----------
     output : Path
         A folder for what is built.
+    compiled : mapping
+        Programs that are compiled already, by name.
 
     Returns
     -------
@@ -398,7 +400,7 @@ def measure(output: Path) -> list[Row]:
     programs["beacon_navigation"] = _run_beacon_navigation
     programs["mission"] = _run_mission
     programs["power_cuts"] = _run_power_cuts
-    compiled = {}
+    ready = dict(compiled or {})
     for program in programs:  # one after the other: they share Arduino's core
         folder = output / "sketches" / program
         shutil.rmtree(folder, ignore_errors=True)
@@ -408,10 +410,11 @@ def measure(output: Path) -> list[Row]:
             folder.mkdir(parents=True)
             (folder / f"{program}.ino").write_text(_source(program), encoding="utf-8")
             shutil.copy(ROOT / "firmware" / "board" / "board.hpp", folder)
-        compiled[program] = compile_sketch(folder, library, output / "compiled")
+        if program not in ready:
+            ready[program] = compile_sketch(folder, library, output / "compiled")
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         runs = {
-            program: pool.submit(run, compiled[program], output / "sketches" / program)
+            program: pool.submit(run, ready[program], output / "sketches" / program)
             for program, run in programs.items()
         }
         return [run.result() for run in runs.values()]

@@ -30,14 +30,13 @@
 
 #include "auvest/models/piecewise_acceleration.hpp"
 #include "auvest/models/slave_motion.hpp"
-#include "auvest/registry.hpp"
 #include "auvest/slat/dead_reckoning.hpp"
 #include "auvest/slat/ekf_slat.hpp"
 #include "auvest/slat/outage.hpp"
 #include "auvest/slat/slatf.hpp"
 #include "auvest/slat/slatf_joint.hpp"
 #include "bindings/slat_state.hpp"
-#include "desk/catalogue.hpp"
+#include "desk/states.hpp"
 
 namespace {
 
@@ -542,20 +541,6 @@ void attack_slat(Bytes& bytes) {
 }
 
 }  // namespace
-
-namespace auvest {
-namespace desk {
-
-template <int N, class Number>
-void add_models(Catalogue<Number>& catalogue) {
-  using Scalar = Number;
-  add_filters<N>(catalogue);
-  AUVEST_PROCESSES(AUVEST_ADD_PROCESS)
-  AUVEST_SENSORS(AUVEST_ADD_SENSOR)
-}
-
-}  // namespace desk
-}  // namespace auvest
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   Bytes bytes(data, size);

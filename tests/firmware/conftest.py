@@ -56,13 +56,31 @@ def build_sketch(library, tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def build_edited(build_sketch, root, tmp_path_factory):
+def example(build_sketch, root, tmp_path_factory):
+    """Return a function that compiles an example as it comes, with all warnings, each once."""
+    folder = tmp_path_factory.mktemp("examples")
+    results = {}
+
+    def example(name):
+        if name not in results:
+            compiled = build_sketch(root / "firmware/library/examples" / name, warnings="all")
+            # One that is edited takes its place.
+            results[name] = replace(compiled, elf=shutil.copy(compiled.elf, folder / f"{name}.elf"))
+        return results[name]
+
+    return example
+
+
+@pytest.fixture(scope="session")
+def build_edited(build_sketch, example, root, tmp_path_factory):
     """Return a function that compiles an example, edited as a user would.
 
     ``settings`` are those of its config.h; ``edits`` are files, a text in each and its replacement.
     """
 
     def build_edited(name, edits=(), **settings):
+        if not edits and not settings:
+            return example(name)
         folder = tmp_path_factory.mktemp("edited") / name
         shutil.copytree(root / "firmware/library/examples" / name, folder)
         config = (folder / "config.h").read_text()

@@ -207,7 +207,8 @@ def test_they_give_way_to_a_real_library(compile_cpp, compiler):
 
 @pytest.mark.parametrize("header", PUBLIC)
 def test_each_public_header_compiles_alone(compile_cpp, header):
-    compile_cpp("avr-g++", include(header, header), *AVR, "-Os", *STRICT, *AUVEST_PATHS)
+    options = (*AVR[1:], "-fsyntax-only", *STRICT, *AUVEST_PATHS)  # templates: no code is made
+    compile_cpp("avr-g++", include(header, header), *options)
 
 
 def test_what_is_not_there_does_not_link(compile_cpp):

@@ -39,11 +39,11 @@ class Run:
 
 
 @pytest.fixture(scope="module")
-def programs(build_sketch, root):
+def programs(build_sketch, example, root):
     """The sketch for the chips that have room for it."""
     folder = root / "firmware/library/examples/beacon_navigation"
-    boards = {"atmega2560": sketch.MEGA2560, "atmega328p": sketch.UNO}
-    return {mcu: build_sketch(folder, board=board).elf for mcu, board in boards.items()}
+    uno = build_sketch(folder, board=sketch.UNO)
+    return {"atmega2560": example("beacon_navigation").elf, "atmega328p": uno.elf}
 
 
 def motion_of(sample, speed, heading):

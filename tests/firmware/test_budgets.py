@@ -12,11 +12,14 @@ pytest_plugins = ["board_support"]
 
 
 @pytest.fixture(scope="module")
-def measured(runner, tmp_path_factory):
+def measured(runner, example, root, tmp_path_factory):
     """All programs, compiled and run now."""
+    names = [path.name for path in (root / "firmware/library/examples").iterdir()]
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("AUVEST_BOARD", str(runner))
-        return budgets.measure(tmp_path_factory.mktemp("budgets"))
+        return budgets.measure(
+            tmp_path_factory.mktemp("budgets"), {name: example(name) for name in names}
+        )
 
 
 @pytest.fixture(scope="module")

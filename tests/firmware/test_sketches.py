@@ -28,19 +28,6 @@ SKETCHES = [
 ]
 
 
-@pytest.fixture(scope="session")
-def compiled(build_sketch, root):
-    """Return a function that compiles an example with all warnings, each once."""
-    results = {}
-
-    def compiled(name):
-        if name not in results:
-            results[name] = build_sketch(root / EXAMPLES / name, warnings="all")
-        return results[name]
-
-    return compiled
-
-
 @pytest.fixture
 def text(board):
     """Return a function that runs a sketch for a time; it gives the lines and the report."""
@@ -54,11 +41,11 @@ def text(board):
 
 
 @pytest.mark.parametrize("name", SKETCHES)
-def test_no_warning_is_ours(compiled, name):
+def test_no_warning_is_ours(example, name):
     theirs = ("/cores/arduino/", "/variants/")
     ours = [
         line
-        for line in compiled(name).report.splitlines()
+        for line in example(name).report.splitlines()
         if "warning:" in line and not any(folder in line for folder in theirs)
     ]
     assert not ours
@@ -68,7 +55,7 @@ def test_examples_are_all_tested(root):
     assert sorted(path.name for path in (root / EXAMPLES).iterdir()) == SKETCHES
 
 
-def test_first_steps(compiled, text):
+def test_first_steps(example, text):
     """The student's first numbers are the desk's."""
     filter_ = Ukf(
         np.float32([3, 4, 0.1, 0.2, 0, 0]),
@@ -80,12 +67,12 @@ def test_first_steps(compiled, text):
     )
     filter_.predict(0.5)
     filter_.update(np.float32([3.6, 0.65]))
-    lines, _ = text(compiled("first_steps").elf, 0.1)
+    lines, _ = text(example("first_steps").elf, 0.1)
     assert lines == ["ok", f"x = {filter_.x[0]:.3f} m, y = {filter_.x[1]:.3f} m"]
 
 
-def test_first_steps_on_an_uno(compiled, build_sketch, root, text, board):
-    there, _ = text(compiled("first_steps").elf, 0.1)
+def test_first_steps_on_an_uno(example, build_sketch, root, text, board):
+    there, _ = text(example("first_steps").elf, 0.1)
     elf = build_sketch(root / EXAMPLES / "first_steps", board=UNO).elf
     with board(elf, mcu="atmega328p", for_s=0.1) as running:
         here = [event.text for event in running if hasattr(event, "text")]
@@ -94,9 +81,9 @@ def test_first_steps_on_an_uno(compiled, build_sketch, root, text, board):
     assert running.report.free_bytes >= 100
 
 
-def test_replay(compiled, text):
+def test_replay(example, text):
     """All 60 estimates are those of the simulation on the desk, and the sketch says so itself."""
-    lines, report = text(compiled("replay").elf, 2.0)
+    lines, report = text(example("replay").elf, 2.0)
     rows = np.array([line.split(",") for line in lines if line[0].isdigit()], dtype=float)
     noise = paper_aukf.paper_noise()
     desk = simulate(
@@ -278,6 +265,6 @@ def test_a_loop_that_hangs_is_ended_by_the_watchdog(name, build_edited, board):
 
 @SLOW
 @pytest.mark.parametrize("name", GUARDED)
-def test_a_sketch_whose_instruments_are_silent_is_not_ended(name, compiled, board):
-    with board(compiled(name).elf, for_s=6.0) as running:
+def test_a_sketch_whose_instruments_are_silent_is_not_ended(name, example, board):
+    with board(example(name).elf, for_s=6.0) as running:
         assert running.run().reason == "elapsed"
