@@ -367,7 +367,9 @@ def test_thinning_does_not_depend_on_the_parts() -> None:
     rows = {"time_s": time, "row": np.arange(len(time))}
     whole = Spacing(1.0).kept(rows)
     assert whole["row"].tolist() == [0, 1, 6, 7, 10, 11]
-    parts = Spacing(1.0)
-    got = [parts.kept({k: v[i : i + 3] for k, v in rows.items()})["row"] for i in range(0, 14, 3)]
-    assert np.concatenate(got).tolist() == whole["row"].tolist()
+    for size in (1, 3, 7):  # the last cuts through a time that is kept
+        parts = Spacing(1.0)
+        cut = [{name: one[i : i + size] for name, one in rows.items()} for i in range(0, 14, size)]
+        kept = np.concatenate([parts.kept(part)["row"] for part in cut])
+        assert kept.tolist() == whole["row"].tolist()
     assert Spacing(0.0).kept(rows) is rows
