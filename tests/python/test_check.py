@@ -67,6 +67,41 @@ def named(checked: Checked) -> list[tuple[str, str, int | None]]:
     return [(one.cause, one.file, one.line) for one in checked.findings]
 
 
+@pytest.mark.parametrize("late", ["ranges", "positions"])
+def test_a_forgotten_latency_is_the_cause_and_not_that_there_is_none(
+    tmp_path: Path, late: str
+) -> None:
+    """2 s at 3 m/s, of ranges or of positions; innovations that it explains are no finding."""
+    random = np.random.default_rng(3)
+    time = np.arange(0, 600.05, 0.5)
+    heading = 0.7 * np.sin(time / 60) + 1.6 * (time // 150)
+    way = np.cumsum(np.concatenate([[0.0], 1.5 * np.exp(1j * heading[:-1])]))
+    rate = np.diff(heading, append=heading[-1]) / 0.5
+    write_file(tmp_path, "odometry.csv", time_s=time, speed_m_s=np.full(len(time), 3.0),
+               yaw_rate_rad_s=rate)  # fmt: skip
+    used = np.arange(10, len(time) - 10, 10)
+    source = np.where(used % 20, 1, 2)
+    beacons = {1: 100 + 200j, 2: 300 - 100j}
+    places = np.array([beacons[one] for one in source])
+    ranges = np.abs(way[used] - places) + random.normal(0, 1, len(used))
+    told_s = {"ranges": 0.0, "positions": 0.0, late: 2.0}
+    write_file(tmp_path, "ranges.csv", time_s=time[used] + told_s["ranges"], source=source,
+               range_m=ranges)  # fmt: skip
+    fixed = way[used[::2]] + random.normal(0, 1, (len(used[::2]), 2)) @ [1, 1j]
+    write_file(tmp_path, "positions.csv", time_s=time[used[::2]] + told_s["positions"],
+               x_m=fixed.real, y_m=fixed.imag)  # fmt: skip
+    write_file(tmp_path, "beacons.csv", source=[1, 2], x_m=[100, 300], y_m=[200, -100])
+    write_file(tmp_path, "start.csv", time_s=[0.0], x_m=[0.0], y_m=[0.0], heading_rad=[0.0])
+    sure = {"sigma_distance": 0.01, "sigma_drift": 0.02, "sigma_turn": 0.001}
+    checked = check(tmp_path, settings_from({"odometry": sure}))
+    wrong = [one for one in checked.findings if one.verdict != "sound"]
+    assert [one.cause for one in wrong if one.cause != "recoveries"] == ["latency"]
+    assert wrong[0].message.startswith(f"{late} fit when taken 2 s before their time")
+    assert checked.health is not None
+    if len(wrong) == 1:
+        assert checked.health.reason == wrong[0].text
+
+
 def test_the_documented_causes_are_the_causes() -> None:
     text = (ROOT / "docs" / "logs.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| `(\w+)` \| (.+) \| (sound|doubtful|not_trusted) \|$", text, re.M)

@@ -48,6 +48,33 @@ def test_each_filter_is_replayed_as_alone(compared: tuple[Path, dict[str, Any]])
     assert told["filters"][0]["rmse_m"] > 3 * told["filters"][1]["rmse_m"]
 
 
+def test_each_filter_goes_back_over_the_log(
+    compared: tuple[Path, dict[str, Any]], tmp_path: Path
+) -> None:
+    folder, told = compared
+    options = [part for name in FILTERS for part in ("--filter", name)]
+    options += ["--set", "ranges.sigma_m=0.5", "--output", str(tmp_path), "--json", "--quiet"]
+    ran = compare(folder / "log", *options, "--smooth", "--lag", 20)
+    assert ran.exit_code == 0, ran.output
+    settings = settings_from({"ranges": {"sigma_m": 0.5}}, "test")
+    found = json.loads(ran.stdout)["filters"]
+    for name, one, causal in zip(FILTERS, found, told["filters"], strict=True):
+        alone = replay(
+            LogFolder(folder / "log"),
+            settings,
+            filter_name=name,
+            smooth=True,
+            lag_s=20.0,  # type: ignore[arg-type]
+        )
+        assert one["smoothed"] == alone.numbers["smoothed"]
+        assert one["rmse_m"] == causal["rmse_m"]
+        assert (tmp_path / "log" / name / "smoothed.tum").is_file()
+    page = (tmp_path / "log" / "report.html").read_text(encoding="utf-8")
+    assert '"label": "EKF, smoothed"' in page
+    assert '"label": "robust EKF, smoothed"' in page
+    assert compare(folder / "log", *options, "--lag", 20).exit_code == 2
+
+
 def test_what_it_writes(compared: tuple[Path, dict[str, Any]]) -> None:
     folder, told = compared
     made = folder / "out" / "log"

@@ -99,6 +99,27 @@ def test_units_by_name_and_by_size(tmp_path: Path) -> None:
     assert made.units == {"time_s": "ms", "range_m": "cm", "azimuth_rad": "deg"}
 
 
+@pytest.mark.parametrize(
+    ("depth", "step_s", "range_m", "unit"),
+    [
+        ([330, 331, 329, 334, 335], 0.2, None, "cm"),  # in metres it would dive at 5 m/s and more
+        ([330.5, 331.2, 329.9, 330.1, 330.2], 0.2, 50.0, "cm"),  # deeper than any range
+        ([3.30, 3.31, 3.29, 3.34, 3.35], 0.2, 50.0, None),
+        ([12, 13, 13, 14, 16], 5.0, 50.0, None),  # whole metres
+        ([12, 12, 12, 12, 12], 0.2, 50.0, None),
+        ([330, 330.5, 329, 330, 331], 0.2, 500.0, None),  # a deep craft
+    ],
+)
+def test_a_depth_in_centimetres_is_seen(
+    tmp_path: Path, depth: list[float], step_s: float, range_m: float | None, unit: str | None
+) -> None:
+    rows = [f"{k * step_s},{value}" for k, value in enumerate(depth)]
+    (tmp_path / "keller.csv").write_text("\n".join(["t,depth", *rows, ""]))
+    if range_m is not None:
+        (tmp_path / "ranges.csv").write_text(f"time_s,source,range_m\n1,3,{range_m}\n2,3,9\n")
+    assert guess(tmp_path).files["depth.csv"].units.get("depth_m") == unit
+
+
 def test_a_table_has_a_header_of_names(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     for wrong in ("1,2\n3,4\n", "a\nb\n", "", "a,a\n1,2\n"):

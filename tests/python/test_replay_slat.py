@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import math
 from pathlib import Path
@@ -11,13 +12,14 @@ import numpy as np
 import pyarrow.csv as pa_csv
 import pyarrow.parquet as parquet
 import pytest
+from test_replay_report import opened
 from typer.testing import CliRunner
 
 from auvest.cli import app
 from auvest.importers.sets import IMPORTERS
 from auvest.logs import LogError, LogFolder, reader
 from auvest.logs.write import write_file
-from auvest.replay import Settings, checks, read_settings, replay, report, settings_from
+from auvest.replay import Settings, checks, drawing, read_settings, replay, report, settings_from
 from auvest.replay.readings import Held
 from auvest.replay.thinning import Spacing
 from auvest.simulation.paper_slatf import paper_filter
@@ -169,6 +171,21 @@ def test_exact_echoes_leave_an_exact_track(tmp_path: Path, name: Any) -> None:
     assert np.hypot(rows["place_x_m"][-1] - 59.5, rows["place_y_m"][-1] - 28.2) < 2.0
 
 
+@pytest.mark.parametrize("name", ["slatf2", "ekf-slat"])
+def test_the_page_draws_masters_where_they_are_believed_to_be(tmp_path: Path, name: Any) -> None:
+    """As leaders are; innovations have no sigma, and particles no NIS."""
+    sea(tmp_path / "log", sources=(7, 9))
+    result = replay(LogFolder(tmp_path / "log"), settings_from(EXACT), filter_name=name)
+    found = opened(report.html(result), tmp_path, 'await step("opened", () => slide(59));')
+    assert found["trouble"] == []
+    drawn = drawing.document([result])["leaders"]
+    assert [one["source"] for one in drawn] == [7, 9]
+    for one in drawn:
+        kind, raw = one["points"]["x_m"]["kind"], one["points"]["x_m"]["bytes"]
+        x = np.frombuffer(base64.b64decode(raw), kind) + one["points"]["x_m"]["offset"]
+        np.testing.assert_allclose(x, 30 + 0.5 * np.arange(1, 60, 2), atol=3)
+
+
 def test_increments_are_the_velocities_that_they_come_from(tmp_path: Path) -> None:
     sea(tmp_path / "speeds")
     sea(tmp_path / "steps", increments=True)
@@ -214,7 +231,11 @@ def test_a_wrong_echo_is_refused_and_named(tmp_path: Path) -> None:
         assert np.flatnonzero(rows["outcome"] == "rejected").tolist() == [15]
         assert rows["weight_0"][15] == 0.0
         assert rows["innovation_0"][15] == pytest.approx(30, abs=1)
-        assert (np.isfinite(rows["nis"]).sum() > 0) == (name == "ekf-slat")
+        assert np.isfinite(rows["nis"]).any() == (name == "ekf-slat")
+        if name == "ekf-slat":  # it shows though it was refused; the first echo has none
+            assert rows["nis"][15] > 13.8
+            assert np.isnan(rows["nis"]).sum() == 1
+            assert np.delete(rows["nis"], [0, 15]).max() < 13.8
 
 
 def test_a_gate_that_refuses_nearly_all_is_said(tmp_path: Path) -> None:
@@ -346,7 +367,9 @@ def test_thinning_does_not_depend_on_the_parts() -> None:
     rows = {"time_s": time, "row": np.arange(len(time))}
     whole = Spacing(1.0).kept(rows)
     assert whole["row"].tolist() == [0, 1, 6, 7, 10, 11]
-    parts = Spacing(1.0)
-    got = [parts.kept({k: v[i : i + 3] for k, v in rows.items()})["row"] for i in range(0, 14, 3)]
-    assert np.concatenate(got).tolist() == whole["row"].tolist()
+    for size in (1, 3, 7):  # the last cuts through a time that is kept
+        parts = Spacing(1.0)
+        cut = [{name: one[i : i + size] for name, one in rows.items()} for i in range(0, 14, size)]
+        kept = np.concatenate([parts.kept(part)["row"] for part in cut])
+        assert kept.tolist() == whole["row"].tolist()
     assert Spacing(0.0).kept(rows) is rows

@@ -2,11 +2,14 @@
 
 LOG is a folder of CSV files, as for 'auvest replay'. The output folder gets one self-contained HTML
 report with all tracks in one map and one set of plots, results.json, and for each filter a folder
-with its tables and track. Settings are the same for all filters.
+with its tables and track. Settings are the same for all filters. With --smooth each goes back over
+the log from its end, and has two tracks.
 
 Examples
 --------
   auvest compare logs/goats14 --config goats14 --filter ekf --filter robust-ekf
+
+  auvest compare logs/goats14 --config goats14 --filter ekf --filter robust-ekf --smooth
 
   auvest compare logs/robot1 --filter ekf --filter ukf --filter ckf --json --quiet
 """
@@ -49,6 +52,8 @@ def command(
     config: log_options.Config = None,
     changes: log_options.Set = None,
     kernel: log_options.KernelOption = None,
+    smooth: log_options.Smooth = False,
+    lag_s: log_options.Lag = None,
     output: options.Output = Path("auvest-output/compare"),
     force: options.Force = False,
     as_json: options.Json = False,
@@ -56,6 +61,7 @@ def command(
 ) -> None:
     """Compare; the help text is the module's."""
     terminal = Terminal(as_json=as_json, quiet=quiet)
+    log_options.require_smooth(smooth=smooth, lag_s=lag_s)
     with terminal.usage_errors():
         names = [cast(FilterName, filter_named(one, replayable()).name) for one in filters]
         if len(filters) < 2 or len(set(filters)) < len(filters):
@@ -75,7 +81,13 @@ def command(
             tables.mkdir()
             try:
                 result = run_replay(
-                    folder, settings, filter_name=filter_name, folder=tables, progress=progress
+                    folder,
+                    settings,
+                    filter_name=filter_name,
+                    folder=tables,
+                    progress=progress,
+                    smooth=smooth,
+                    lag_s=lag_s,
                 )
             except FilterError as error:
                 terminal.fail(f"{name}, {filter_name}: {error}", ExitCode.FAILED)

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from auvest.commands import options
 from auvest.replay import Settings, find_settings
 from auvest.replay.config import FilterName, KernelName, packaged_settings
 
@@ -48,6 +49,26 @@ KernelOption = Annotated[
         "--kernel", help="The robust kernel.", show_default="that of the settings, else hampel"
     ),
 ]
+
+Smooth = Annotated[
+    bool, typer.Option("--smooth", help="Go back over each log with what came later.")
+]
+Lag = Annotated[
+    float | None,
+    typer.Option(
+        "--lag",
+        help="With --smooth: only with what came within so many seconds.",
+        metavar="S",
+        callback=options.not_negative,
+        show_default="everything that came later",
+    ),
+]
+
+
+def require_smooth(*, smooth: bool, lag_s: float | None) -> None:
+    """Refuse --lag where nothing is smoothed."""
+    if lag_s is not None and not smooth:
+        raise typer.BadParameter("needs --smooth.", param_hint="'--lag'")
 
 
 def settings_of(

@@ -48,19 +48,6 @@ from auvest.replay import Result
 from auvest.replay import replay as run_replay
 from auvest.replay.run import FORMATS, PAGES, TABLES, WRITTEN
 
-Smooth = Annotated[
-    bool, typer.Option("--smooth", help="Go back over each log with what came later.")
-]
-Lag = Annotated[
-    float | None,
-    typer.Option(
-        "--lag",
-        help="With --smooth: only with what came within so many seconds.",
-        metavar="S",
-        callback=options.not_negative,
-        show_default="everything that came later",
-    ),
-]
 _ALL = ",".join(WRITTEN)
 Write = Annotated[
     str,
@@ -87,8 +74,8 @@ def command(
     config: log_options.Config = None,
     changes: log_options.Set = None,
     kernel: log_options.KernelOption = None,
-    smooth: Smooth = False,
-    lag_s: Lag = None,
+    smooth: log_options.Smooth = False,
+    lag_s: log_options.Lag = None,
     write: Write = _ALL,
     kind: Format = "parquet",
     every_s: Every = 0.0,
@@ -99,8 +86,7 @@ def command(
 ) -> None:
     """Replay; the help text is the module's."""
     terminal = Terminal(as_json=as_json, quiet=quiet)
-    if lag_s is not None and not smooth:
-        raise typer.BadParameter("needs --smooth.", param_hint="'--lag'")
+    log_options.require_smooth(smooth=smooth, lag_s=lag_s)
     wanted = [word.strip() for word in write.split(",")]
     if not {*wanted} <= {*WRITTEN}:
         raise typer.BadParameter(f"must be of {', '.join(WRITTEN)}.", param_hint="'--write'")

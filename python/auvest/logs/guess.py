@@ -10,14 +10,17 @@ import math
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
+from statistics import median
 
 from auvest._outputs import is_plain_file
 from auvest.logs.layout import COLUMNS, FILES, match
 from auvest.logs.reading import SEPARATORS, UNITS, FileReading, columns_of, seconds_of
 
+#: No craft dives faster than this, m/s.
+DIVE_M_S = 3.0
 #: Lines of a table that are looked at, and the largest header that is one.
 LINES, LONGEST = 200, 10_000
 #: Names of columns as instruments write them, and the column of a log that each is.
@@ -77,6 +80,7 @@ class Guess:
 def guess(folder: Path) -> Guess:
     """Look at the tables of a folder and say which file of a log each may be."""
     found = Guess()
+    seen_as: dict[str, Table] = {}
     taken = {name for name in FILES if _is_log_file(folder / name, name)}
     for path in sorted(folder.iterdir()):
         if path.suffix.lower() not in (".csv", ".tsv", ".txt", ".dat", ".log"):
@@ -89,10 +93,54 @@ def guess(folder: Path) -> Guess:
         for name in kinds:
             assert seen is not None
             found.files[name] = _reading(name, seen, named)
+            seen_as[name] = seen
             taken.add(name)
         if not kinds:
             found.unknown.append(path.name)
+    for name in taken - set(seen_as):
+        if (plain := table_of(folder / name)) is not None:
+            seen_as[name] = plain
+    _see_centimetres(found, seen_as)
     return found
+
+
+def _see_centimetres(found: Guess, tables: Mapping[str, Table]) -> None:
+    """Say so of a depth that no name gives a unit, if as metres it cannot be.
+
+    It then lies deeper than any range is long, or is in whole numbers that change faster than a
+    craft dives.
+    """
+    reading = found.files.get("depth.csv")
+    if reading is None or "depth_m" in reading.units or "depth_m" not in reading.columns:
+        return
+    depth = _values(found, tables, "depth.csv", "depth_m")
+    time = _values(found, tables, "depth.csv", "time_s") or _values(
+        found, tables, "depth.csv", "time"
+    )
+    ranges = [one for name in ("ranges.csv", "fixes.csv") if name in tables
+              for one in _values(found, tables, name, "range_m")]  # fmt: skip
+    changes = [
+        abs(after - before) / (later - sooner)
+        for sooner, later, before, after in zip(time, time[1:], depth, depth[1:], strict=False)
+        if later > sooner and after != before
+    ]
+    whole = all(one == math.floor(one) for one in depth)
+    fast = whole and len(changes) > 2 and median(changes) > DIVE_M_S
+    if depth and (fast or (ranges and min(depth) > max(ranges))):
+        found.files["depth.csv"] = replace(reading, units={**reading.units, "depth_m": "cm"})
+
+
+def _values(found: Guess, tables: Mapping[str, Table], name: str, column: str) -> list[float]:
+    """Give the numbers of a column of a log, in the units of the log, as far as they were read."""
+    seen, reading = tables[name], found.files.get(name, FileReading())
+    own = reading.columns.get(column, column)
+    if own not in seen.header:
+        return []
+    cells = [row[seen.header.index(own)] for row in seen.rows]
+    if column == "time":
+        return [seconds_of(cell) for cell in cells] if _all_times(cells) else []
+    factor = reading.factor(column)
+    return [factor * one for one in _numbers(cells, seen.decimal)]
 
 
 def table_of(path: Path) -> Table | None:

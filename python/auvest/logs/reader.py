@@ -23,7 +23,7 @@ Rows = npt.NDArray[np.float64]
 
 #: Lines read at once: a few megabytes, and long enough that the cost of a chunk does not count.
 CHUNK_LINES = 32768
-_LINE_BYTES = 64  # or less
+_LINE_BYTES = 40  # or so
 #: Of fewer lines numbers are read without pyarrow, which takes longer to import.
 FEW_LINES = 1000
 #: What a name ends with that is in another unit than the layout's.

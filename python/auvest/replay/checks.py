@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -130,9 +130,13 @@ def innovations(
     if log.echoing or not causes or worst(one.verdict for one in [*found, *lost]) != "sound":
         return shown
     named = diagnosis.diagnose(log, settings, filter_name, gross=bool(shown))
-    if named:  # it explains why one source has more of it than others
-        shown = [one for one in shown if one.cause not in ("source_off", "start_off")]
-    return [*named, *shown]
+    if not named:
+        return shown
+    # It explains why measurements do not fit, and why one source has more of it than others.
+    explained = [one for one in shown if one.cause in ("innovations", "source_off", "start_off")]
+    gravest = worst([named[0].verdict, *(one.verdict for one in explained)])
+    named[0] = replace(named[0], verdict=gravest)
+    return [*named, *(one for one in shown if one not in explained)]
 
 
 def check(path: Path, settings: Settings, filter_name: FilterName | None = None) -> Checked:

@@ -8,7 +8,7 @@ the log as it is, and than any other, is the cause that is named.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -291,6 +291,8 @@ def _families(log: LogFolder, rows: Columns, *, gross: bool) -> Iterator[list[Hy
         yield list(_headings(log, mirrored=False))
         yield list(_degrees(log))
         yield list(_noises())
+    if not tracking and "positions.csv" in log:
+        yield _latency("positions", {"positions.csv"})
     if not any(name in log for name in names):  # absolute positions alone
         return
     yield Number(
@@ -311,14 +313,7 @@ def _families(log: LogFolder, rows: Columns, *, gross: bool) -> Iterator[list[Hy
             DEPTHS_M,
         )
     if not tracking:
-        yield Number(
-            lambda latency: Hypothesis(
-                "latency",
-                measured(_earlier(latency)),
-                f"ranges fit when taken {latency:.2g} s before their time",
-            ),
-            LATENCIES_S,
-        )
+        yield _latency("ranges", names)
     sources = np.unique(rows["source"][rows["source"] >= 0]).astype(int).tolist()
     if gross and len(sources) > 1:
         yield [
@@ -331,6 +326,17 @@ def _families(log: LogFolder, rows: Columns, *, gross: bool) -> Iterator[list[Hy
             )
             for source in sources
         ]
+
+
+def _latency(what: str, names: Iterable[str]) -> Number:
+    return Number(
+        lambda latency: Hypothesis(
+            "latency",
+            dict.fromkeys(names, _earlier(latency)),
+            f"{what} fit when taken {latency:.2g} s before their time",
+        ),
+        LATENCIES_S,
+    )
 
 
 def _has_elevations(log: LogFolder) -> bool:

@@ -424,11 +424,13 @@ class Companion(Replay):
             farthest = mine[np.argsort(-square[mine], kind="stable")]
             refused[farthest[: way.refused[r]]] = True
             reborn[farthest[: way.reborn[r]]] = True
-            if isinstance(self._slat, EkfSlat):
-                heard.nis[mine] = way.nis[r] / max(len(mine), 1)
+            # Of several echoes the core tells one NIS, not how much is whose; of a rebirth none.
+            shared = len(mine) == 1 or way.refused[r] == 0
+            if isinstance(self._slat, EkfSlat) and shared and way.reborn[r] == 0:
+                heard.nis[mine] = way.nis[r] / len(mine)
         columns["outcome"][used] = np.where(refused, tables.REJECTED, tables.ACCEPTED)
         columns["recovered"][used] = reborn
-        columns["nis"][used] = np.where(refused, np.nan, heard.nis)
+        columns["nis"][used] = heard.nis
         for m in range(2):
             columns[f"innovation_{m}"][used] = innovation[:, m]
             columns[f"weight_{m}"][used] = np.where(refused, 0.0, 1.0)
