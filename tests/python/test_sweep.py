@@ -8,6 +8,7 @@ import re
 import shutil
 import sys
 from collections.abc import Iterator
+from concurrent.futures import CancelledError
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -333,6 +334,18 @@ def test_a_worker_that_may_not_compute_gets_no_task(
     with pytest.raises(auvest.SweepError, match=r"has no worker with auvest .*; tcp://.* has auve"):
         auvest.sweep(SMALL, executor=dask.Dask(client, warn=said.append))
     client.run(_pretend, "nothing")
+
+
+@pytest.mark.parametrize("error", [CancelledError("connection lost"), OSError("closed")])
+def test_a_scheduler_that_goes_away_is_said(
+    error: Exception, client: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def gone(_self: Any) -> None:
+        raise error
+
+    monkeypatch.setattr(dask._Run, "_look", gone)
+    with pytest.raises(auvest.SweepError, match="the scheduler is gone: c"):
+        auvest.sweep(SMALL, scheduler=client)
 
 
 def test_no_scheduler_is_said() -> None:
