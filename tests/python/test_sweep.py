@@ -225,7 +225,7 @@ def test_a_list_of_points_times_a_grid() -> None:
     ("settings", "message"),
     [
         ({}, r"\[sweep\] needs a scenario"),
-        ({"sweep": {"scenario": "x"}, "grid": {"a": [1]}}, "scenario must be one of tracking, sl"),
+        ({"sweep": {"scenario": "x"}, "grid": {"a": [1]}}, "scenario must be 'tracking', 'sl"),
         ({"sweep": {"scenario": "tracking"}}, r"nothing is swept"),
         ({**SMALL, "gird": {}}, "has no 'gird'; known are sweep, fixed, grid, points"),
         (changed(SMALL, "sweep", run=3), r"\[sweep\] has no 'run'"),
@@ -242,7 +242,12 @@ def test_a_list_of_points_times_a_grid() -> None:
             "filter.alpah is unknown; known are alph",
         ),
         (changed(SMALL, "fixed", noise=3), "noise"),
-        (changed(SMALL, "fixed", **{"filter.kind": "slatf"}), "filter.kind must be ekf, ukf or au"),
+        (changed(SMALL, "fixed", track="circle"), "track must be 'paper', 'straight' or 'turn'"),
+        (changed(SMALL, "grid", **{"interval.policy": ["x"]}), "interval.policy must be 'fixed',"),
+        (
+            changed(SMALL, "fixed", **{"filter.kind": "slatf"}),
+            "filter.kind must be 'ekf', 'ukf' or 'au",
+        ),
     ],
 )
 def test_wrong_settings_are_refused_by_name(settings: dict[str, Any], message: str) -> None:
