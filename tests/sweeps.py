@@ -15,13 +15,16 @@ import signal
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import auvest
 from auvest.montecarlo import Interrupted
-from auvest.sweeps.dask import Dask
+from auvest.sweeps import dask, read_plan
+from auvest.sweeps.plan import Task
 from auvest.sweeps.processes import Processes
 from auvest.sweeps.run import PARTS
 
@@ -39,12 +42,12 @@ LONG: Settings = {
     },
 }
 
-#: Tasks of about five seconds.
-FIVE_SECONDS: Settings = {
-    "sweep": {"scenario": "slat", "runs": 1200, "runs_per_task": 400},
-    "fixed": {"filter.kind": "slatf2"},
-    "grid": {"level": [1, 2, 3, 4]},
+#: Twelve tasks, whatever they do.
+TWELVE: Settings = {
+    "sweep": {"scenario": "tracking", "runs": 6, "runs_per_task": 1},
+    "grid": {"noise.dropout": [0.0, 0.2]},
 }
+_TASK_S = 5.0
 
 
 @contextmanager
@@ -101,7 +104,7 @@ def with_a_process_killed(settings: Settings, folder: Path) -> Any:
 def stopped_and_resumed(settings: Settings, folder: Path) -> Any:
     """Stop after a third of the tasks, and go on."""
     try:
-        whole = auvest.sweeps.read_plan(settings).tasks
+        whole = read_plan(settings).tasks
         auvest.sweep(settings, output=folder, workers=2, progress=after(len(whole) // 3, interrupt))
     except Interrupted as stop:
         done = stop.partial.computed
@@ -134,7 +137,7 @@ def on_dask_with_a_worker_killed(settings: Settings, folder: Path, client: Any) 
     """Compute on a cluster, of which one worker is killed on the way."""
     pids = list(client.run(os.getpid).values())
     kill = after(3, lambda: os.kill(pids[0], signal.SIGKILL))
-    return auvest.sweep(settings, output=folder, executor=Dask(client), progress=kill)
+    return auvest.sweep(settings, output=folder, executor=dask.Dask(client), progress=kill)
 
 
 HERE = (serially, in_processes, with_a_process_killed, stopped_and_resumed, in_three_parts)
@@ -157,38 +160,54 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--overhead", action="store_true", help="only what Dask costs")
     only_overhead = parser.parse_args().overhead
+    if not only_overhead:
+        every_way()
+    print(overhead())
+
+
+def every_way() -> None:
+    """Compute the long sweep in every way, and print what each took."""
     digests = set()
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
-        if not only_overhead:
-            for way in HERE:
-                result, took = _measured(way, LONG, folder / way.__name__)
-                digests.add(result.digest())
-                print(f"{way.__name__}: {took:.1f} s, {result.digest()}", flush=True)
-            for way in ON_DASK:
-                with cluster() as client:
-                    result, took = _measured(way, LONG, folder / way.__name__, client)
-                digests.add(result.digest())
-                print(f"{way.__name__}: {took:.1f} s, {result.digest()}", flush=True)
-            print("the same digest" if len(digests) == 1 else "DIGESTS DIFFER")
-        # Processor time, which other programs on the machine do not change; the cluster stands
-        # before, as it does where there is one.
-        start = processor_s()
-        serially(FIVE_SECONDS, folder / "five-serially")
-        alone = processor_s() - start
-        start = processor_s()
-        with cluster():
-            pass
-        empty = processor_s() - start
-        start = processor_s()
-        with cluster() as client:
-            on_dask(FIVE_SECONDS, folder / "five-dask", client)
-        shared = processor_s() - start - empty
-        print(
-            f"12 tasks of {alone / 12:.1f} s: serially {alone:.1f} s of processor time, on Dask "
-            f"{shared:.1f} s ({100 * (shared / alone - 1):.1f} % more; "
-            f"a cluster that does nothing: {empty:.1f} s)"
-        )
+        for way in (*HERE, *ON_DASK):
+            with cluster() if way in ON_DASK else nullcontext() as client:
+                more = () if client is None else (client,)
+                result, took = _measured(way, LONG, folder / way.__name__, *more)
+            digests.add(result.digest())
+            print(f"{way.__name__}: {took:.1f} s, {result.digest()}", flush=True)
+    print("the same digest" if len(digests) == 1 else "DIGESTS DIFFER")
+
+
+def _sleep(task: Task) -> Any:
+    time.sleep(_TASK_S)
+    return {"value": np.zeros(task.count)}
+
+
+def overhead() -> str:
+    """Measure what Dask takes for itself, beside tasks that only wait.
+
+    So it is measured on a machine that is busy with other things too: computing would take longer
+    there on two workers than on one.
+    """
+    start = processor_s()
+    with cluster():
+        pass
+    empty = processor_s() - start
+    dask.attempt = _sleep  # type: ignore[assignment]
+    tasks = read_plan(TWELVE).tasks
+    start = processor_s()
+    with cluster() as client:
+        begin = time.perf_counter()
+        done = len(list(dask.Dask(client)(tasks)))
+        took = time.perf_counter() - begin
+    used = processor_s() - start - empty
+    whole = done * _TASK_S
+    return (
+        f"{done} tasks of {_TASK_S:g} s on two workers: {took:.1f} s where {whole / 2:g} s is the "
+        f"least; {used:.1f} s of processor time beside those of the tasks, "
+        f"{100 * used / whole:.1f} % (and {empty:.1f} s to start and end a cluster)"
+    )
 
 
 if __name__ == "__main__":

@@ -22,6 +22,11 @@ def rmse(error: npt.ArrayLike) -> float:
     -------
     float
         In the unit of ``error``; NaN if no vector is left.
+
+    Examples
+    --------
+    >>> rmse([[3.0, 4.0], [0.0, 5.0]])  # each 5 m long
+    5.0
     """
     square = np.square(np.asarray(error, dtype=np.float64)).sum(axis=-1)
     square = square[~np.isnan(square)]
@@ -51,6 +56,11 @@ def nees(
     ------
     ValueError
         If the shapes do not fit.
+
+    Examples
+    --------
+    >>> nees([[2.0, 0.0], [0.0, 2.0]], [[[4.0, 0.0], [0.0, 1.0]]] * 2).tolist()  # 1 and 2 sigma
+    [1.0, 4.0]
     """
     e = np.asarray(error, dtype=np.float64)
     p = np.asarray(P, dtype=np.float64)
@@ -82,6 +92,12 @@ def chi2_bounds(dof: int, count: int = 1, level: float = 0.95) -> tuple[float, f
     -------
     (float, float)
         Lower and upper bound.
+
+    Examples
+    --------
+    >>> low, high = chi2_bounds(2, 100)  # the mean of 100 NIS of range and bearing
+    >>> f"{low:.2f} to {high:.2f}"
+    '1.63 to 2.41'
     """
     as_integer("dof", dof, 1, 10**9)
     as_integer("count", count, 1, 10**9)
@@ -131,6 +147,13 @@ def nis_consistency(nis: npt.ArrayLike, dof: int, level: float = 0.95) -> Consis
         Numbers in a measurement.
     level : float
         Probability of the bounds, in (0, 1).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> nis = np.random.default_rng(1).chisquare(1, size=(20, 100))
+    >>> nis_consistency(nis, dof=1).consistent, nis_consistency(1.2 * nis, dof=1).consistent
+    (True, False)
     """
     values = _runs_and_steps("nis", nis)
     known = values[np.isfinite(values)]

@@ -88,6 +88,18 @@ def run(
     Interrupted
         After Ctrl-C; ``partial`` holds the columns of the chunks that are done, in the order of the
         runs. Functions that simulate by :func:`run` put what they return in its place.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> def dice(first, count):
+    ...     numbers = range(first, first + count)
+    ...     eyes = [np.random.default_rng([1, number]).integers(1, 7) for number in numbers]
+    ...     return {"run": np.array(numbers), "eyes": np.array(eyes)}
+    >>> whole = run(dice, 20)
+    >>> part = run(dice, 5, first=10)
+    >>> bool((part["eyes"] == whole["eyes"][10:15]).all())
+    True
     """
     total = as_integer("runs", runs, 1, 2**53)
     start = as_integer("first", first, 0, 2**53 - total)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import doctest
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +10,6 @@ import pytest
 
 from auvest import metrics, plots
 from auvest.registry import replayable
-
-
-@pytest.mark.parametrize("module", ["auvest.plots", "auvest.sweeps.run"])
-def test_the_examples_of_docstrings_run(module: str) -> None:
-    found = doctest.testmod(import_module(module), raise_on_error=False)
-    assert found.attempted >= 3
-    assert found.failed == 0
 
 
 def lines(figure: Any) -> dict[str, Any]:

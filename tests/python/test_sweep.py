@@ -8,6 +8,7 @@ import re
 import shutil
 import sys
 from collections.abc import Iterator
+from concurrent.futures import CancelledError
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from auvest._outputs import new_file
 from auvest.cli import app
 from auvest.simulation import paper_aukf, tracking
 from auvest.sweeps import dask, processes, read_plan
+from auvest.sweeps.figures import heat_map, profiles
 from auvest.sweeps.plan import Task, run_task
 from auvest.sweeps.processes import Processes
 from auvest.sweeps.worker import Failure, attempt
@@ -223,7 +225,7 @@ def test_a_list_of_points_times_a_grid() -> None:
     ("settings", "message"),
     [
         ({}, r"\[sweep\] needs a scenario"),
-        ({"sweep": {"scenario": "x"}, "grid": {"a": [1]}}, "scenario must be one of tracking, sl"),
+        ({"sweep": {"scenario": "x"}, "grid": {"a": [1]}}, "scenario must be 'tracking', 'sl"),
         ({"sweep": {"scenario": "tracking"}}, r"nothing is swept"),
         ({**SMALL, "gird": {}}, "has no 'gird'; known are sweep, fixed, grid, points"),
         (changed(SMALL, "sweep", run=3), r"\[sweep\] has no 'run'"),
@@ -240,7 +242,12 @@ def test_a_list_of_points_times_a_grid() -> None:
             "filter.alpah is unknown; known are alph",
         ),
         (changed(SMALL, "fixed", noise=3), "noise"),
-        (changed(SMALL, "fixed", **{"filter.kind": "slatf"}), "filter.kind must be ekf, ukf or au"),
+        (changed(SMALL, "fixed", track="circle"), "track must be 'paper', 'straight' or 'turn'"),
+        (changed(SMALL, "grid", **{"interval.policy": ["x"]}), "interval.policy must be 'fixed',"),
+        (
+            changed(SMALL, "fixed", **{"filter.kind": "slatf"}),
+            "filter.kind must be 'ekf', 'ukf' or 'au",
+        ),
     ],
 )
 def test_wrong_settings_are_refused_by_name(settings: dict[str, Any], message: str) -> None:
@@ -335,6 +342,18 @@ def test_a_worker_that_may_not_compute_gets_no_task(
     client.run(_pretend, "nothing")
 
 
+@pytest.mark.parametrize("error", [CancelledError("connection lost"), OSError("closed")])
+def test_a_scheduler_that_goes_away_is_said(
+    error: Exception, client: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def gone(_self: Any) -> None:
+        raise error
+
+    monkeypatch.setattr(dask._Run, "_look", gone)
+    with pytest.raises(auvest.SweepError, match="the scheduler is gone: c"):
+        auvest.sweep(SMALL, scheduler=client)
+
+
 def test_no_scheduler_is_said() -> None:
     pytest.importorskip("distributed", reason="Dask is not installed")
     with pytest.raises(auvest.SweepError, match="no scheduler at nonsense://"):
@@ -399,6 +418,27 @@ def test_the_command_writes_what_it_shows(tmp_path: Path) -> None:
     wrong = CliRunner().invoke(app, [*arguments, "--measure", "rsme"])
     assert wrong.exit_code == 2
     assert "measure must be one of rmse_m, nis" in wrong.stderr
+
+
+def test_the_pictures_show_the_means() -> None:
+    grid = {"noise.range_m": [0.05, 0.2], "noise.dropout": [0.0, 0.2], "interval.tau0": [0.1, 0.5]}
+    result = auvest.sweep({**SMALL, "grid": grid}, workers=1)
+    mean = result.values("rmse_m")[0].reshape(2, 2, 2)  # range noise, dropout, tau0
+    panels = [axes for axes in heat_map(result).axes if axes.images]
+    assert [axes.get_title(loc="left") for axes in panels] == [
+        f"interval.tau0 = {t}" for t in (0.1, 0.5)
+    ]
+    for number, axes in enumerate(panels):
+        assert np.array_equal(axes.images[0].get_array(), mean[:, :, number])
+        assert axes.texts[1].get_text() == f"{mean[0, 1, number]:.3g}"
+    for axis, axes in enumerate(profiles(result).axes):
+        *thin, thick = axes.get_lines()
+        assert len(thin) == 4
+        others = tuple({0, 1, 2} - {axis})
+        assert thick.get_ydata() == pytest.approx(mean.mean(axis=others), rel=1e-12)
+        assert {tuple(line.get_ydata()) for line in thin} == {
+            tuple(row) for row in np.moveaxis(mean, axis, -1).reshape(4, 2).tolist()
+        }
 
 
 def test_a_folder_of_something_else_is_refused(tmp_path: Path) -> None:

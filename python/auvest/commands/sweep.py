@@ -32,7 +32,6 @@ from auvest.commands.files import write_results
 from auvest.commands.version import version
 from auvest.errors import SweepError
 from auvest.sweeps.dask import Dask
-from auvest.sweeps.figures import axes_of, heat_map, profiles
 from auvest.sweeps.result import SweepResult, level
 from auvest.sweeps.run import Executor, sweep
 
@@ -167,10 +166,11 @@ def _write(output: Path, result: SweepResult, *, no_figure: bool) -> dict[str, P
     if no_figure or not result.measures:
         return files
     from auvest import plots  # here, because matplotlib takes long to import
+    from auvest.sweeps import figures
 
-    drawn: dict[str, Any] = {"profiles": profiles}
-    if len(axes_of(result)) > 1:
-        drawn["heat_map"] = heat_map
+    drawn: dict[str, Any] = {"profiles": figures.profiles}
+    if len(figures.axes_of(result)) > 1:
+        drawn["heat_map"] = figures.heat_map
     with plots.own_style():
         for name, draw in drawn.items():
             figure = draw(result)

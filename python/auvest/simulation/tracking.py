@@ -308,6 +308,17 @@ def simulate(
     ------
     ValueError, TypeError
         If an argument is wrong.
+
+    Examples
+    --------
+    >>> from auvest.simulation import paper_aukf, tracking
+    >>> noise = tracking.Noise(range_m=0.1)
+    >>> scenario = tracking.Scenario(noise=noise, runs=30)
+    >>> result = tracking.simulate(paper_aukf.paper_filter("ukf", noise=noise), scenario)
+    >>> result.x.shape, int(result.failed.sum())
+    ((30, 60, 6), 0)
+    >>> sorted(result.per_run())
+    ['interval_s', 'nees', 'nis', 'rmse_m', 'samples', 'status']
     """
     as_instance("filter", filter, (Ekf, Ukf))
     as_instance("scenario", scenario, Scenario)

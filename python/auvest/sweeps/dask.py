@@ -11,7 +11,8 @@ import math
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack
+from concurrent.futures import CancelledError
+from contextlib import ExitStack, suppress
 from typing import Any
 
 from auvest.commands.version import version
@@ -58,7 +59,7 @@ class Dask:
         Raises
         ------
         SweepError
-            If there is no cluster, no worker that may compute, or a task fails.
+            If there is no cluster, it goes away, no worker may compute, or a task fails.
         """
         try:
             from distributed import Client
@@ -73,7 +74,10 @@ class Dask:
                     client = stack.enter_context(Client(self._scheduler, timeout=20))
                 except (OSError, ValueError, asyncio.TimeoutError) as error:
                     raise SweepError(f"no scheduler at {self._scheduler}: {error}") from None
-            yield from _Run(client, self.refused, self._warn).rows(tasks)
+            try:
+                yield from _Run(client, self.refused, self._warn).rows(tasks)
+            except (OSError, CancelledError) as error:  # what becomes of tasks without a scheduler
+                raise SweepError(f"the scheduler is gone: {error}") from None
 
 
 class _Run:
@@ -123,7 +127,7 @@ class _Run:
                         continue
                     yield task, rows_of(task, answer)
         finally:
-            if self._sent:
+            with suppress(OSError):
                 self._client.cancel(list(self._sent), force=True)
 
     def _look(self) -> None:

@@ -12,11 +12,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
 from auvest import montecarlo
+from auvest._arguments import as_kind
 from auvest.intervals import CovarianceBudget, FixedInterval, IntervalPolicy, MahalanobisInterval
 from auvest.kernels import RejectionStreak
 from auvest.montecarlo import Columns
@@ -70,10 +71,8 @@ def experiment(scenario: str, parameters: Mapping[str, Any], seed: int) -> Exper
     ValueError
         If a parameter is unknown or wrong.
     """
-    if scenario not in EXPERIMENTS:
-        known = ", ".join(EXPERIMENTS)
-        raise ValueError(f"scenario must be one of {known}, not {scenario!r}")
     try:
+        as_kind("scenario", scenario, tuple(EXPERIMENTS))
         return EXPERIMENTS[scenario](_nested(parameters), seed)
     except TypeError as error:
         raise ValueError(str(error)) from None
@@ -84,11 +83,9 @@ def _tracking(tree: dict[str, Any], seed: int) -> Experiment:
 
     given = _canonical(tree)
     noise = _make(tracking.Noise, tree, "noise")
-    track = tree.pop("track", "paper")
+    track: Any = as_kind("track", tree.pop("track", "paper"), get_args(paper_aukf.TrackName))
     options = _table(tree, "filter")
-    kind = options.pop("kind", "aukf")
-    if kind not in ("ekf", "ukf", "aukf"):
-        raise ValueError(f"filter.kind must be ekf, ukf or aukf, not {kind!r}")
+    kind: Any = as_kind("filter.kind", options.pop("kind", "aukf"), get_args(paper_aukf.FilterName))
     policy = _interval(tree)
     if policy is not None and kind != "aukf":
         raise ValueError(f"interval is for filter.kind 'aukf', not {kind!r}: give interval_s")
@@ -118,10 +115,7 @@ def _slat(tree: dict[str, Any], seed: int) -> Experiment:
     if "masters" in tree:
         tree["masters"] = slat.paper_masters(tree["masters"])
     options = _table(tree, "filter")
-    kind = options.pop("kind", "slatf2")
-    if kind not in paper_slatf.FILTERS:
-        known_names = ", ".join(paper_slatf.FILTERS)
-        raise ValueError(f"filter.kind must be one of {known_names}, not {kind!r}")
+    kind: Any = as_kind("filter.kind", options.pop("kind", "slatf2"), tuple(paper_slatf.FILTERS))
     scenario = _make(
         partial(slat.SlatScenario, slave=_make(slat.Vehicle, tree, "slave"), seed=seed), tree, ""
     )
@@ -224,8 +218,7 @@ def _interval(tree: dict[str, Any]) -> IntervalPolicy | None:
         return None
     options = _table(tree, "interval")
     kind = options.pop("policy", "mahalanobis")
-    if kind not in _INTERVALS:
-        raise ValueError(f"interval.policy must be one of {', '.join(_INTERVALS)}, not {kind!r}")
+    kind = as_kind("interval.policy", kind, tuple(_INTERVALS))
     return _make(_INTERVALS[kind], options, "interval.")
 
 

@@ -15,6 +15,8 @@ _MOST_PANELS = 12
 #: Cells of a panel whose numbers are written into them, at most.
 _MOST_NUMBERS = 100
 _MOST_LINES = 60
+#: Width of a panel among so many in a row, inches: letters are as large as the text of a page.
+_WIDTHS = {1: 4.6, 2: 3.6, 3: 2.5}
 
 
 def axes_of(result: SweepResult) -> dict[str, list[str]]:
@@ -52,7 +54,10 @@ def heat_map(result: SweepResult) -> Figure:
     wide = min(count, 2 if count <= 4 else 3)
     tall = -(-count // wide)
     figure = plots.new_figure(
-        (1.6 + 3.6 * wide, 1.2 + max(1.8, 0.42 * len(rows) + 0.9) * tall),
+        (
+            1.6 + _WIDTHS[wide] * wide,
+            1.2 + max(1.8, 0.42 * len(rows) + 0.9 + 0.2 * len(names)) * tall,
+        ),
         f"{result.measure}, mean over the runs" + ("" if names or not others else " and the rest"),
     )
     grid = figure.subplots(tall, wide, squeeze=False, sharex=True, sharey=True)
@@ -65,7 +70,7 @@ def heat_map(result: SweepResult) -> Figure:
         panel.set_yticks(range(len(rows)), rows)
         if values.size <= _MOST_NUMBERS:
             _write_numbers(panel, values, low, high)
-        said = ", ".join(f"{name} = {value}" for name, value in zip(names, key, strict=True))
+        said = "\n".join(f"{name} = {value}" for name, value in zip(names, key, strict=True))
         panel.set_title(said, fontsize=9.5, loc="left")
         panel.tick_params(labelsize=9)
     for panel in grid.flat[count:]:
@@ -83,9 +88,11 @@ def profiles(result: SweepResult) -> Figure:
     axes = axes_of(result)
     mean, error = result.values(result.measure)
     count = max(1, len(axes))
-    wide = min(count, 3)
+    wide = min(count, 2 if count == 4 else 3)
     tall = -(-count // wide)
-    figure = plots.new_figure((1.0 + 3.4 * wide, 0.9 + 2.7 * tall), f"{result.measure}: profiles")
+    figure = plots.new_figure(
+        (1.0 + _WIDTHS[wide] * wide, 0.9 + 2.7 * tall), f"{result.measure}: profiles"
+    )
     grid = figure.subplots(tall, wide, squeeze=False, sharey=True)
     for panel, (axis, levels) in zip(grid.flat, axes.items(), strict=False):
         lines: dict[tuple[str, ...], npt.NDArray[np.float64]] = {}

@@ -8,8 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-from pyarrow import parquet
 
 from auvest._outputs import new_file
 from auvest.montecarlo import Columns
@@ -38,6 +36,9 @@ class Parts:
 
     def write(self, task: Task, columns: Columns) -> None:
         """Keep the rows of a task."""
+        import pyarrow as pa  # here, because it is slow to import, and workers do without
+        from pyarrow import parquet
+
         rows = next(iter(columns.values())).shape[0]
         said = {name: _cell(value) for name, value in task.parameters.items()}
         table = pa.table(
@@ -59,6 +60,9 @@ class Parts:
         path = self._path(task)
         if not path.is_file():
             return None
+        import pyarrow as pa  # as in write
+        from pyarrow import parquet
+
         try:
             table = parquet.read_table(path, partitioning=None)
             label = json.loads((table.schema.metadata or {}).get(_LABEL, b"{}"))

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, NullLocator
 
 from auvest import plots
 from auvest.plots import FILTER_COLOURS, KERNEL_COLOURS
@@ -13,10 +14,12 @@ from auvest.reproduce.mekf.measure import KERNELS, LABELS, Reproduction
 
 #: Steps of the track that Fig 5 shows: there and back twice.
 _SHOWN = 2400
+#: Ticks of a ratio to what is expected.
+_RATIOS = (0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0)
 
 
 def tracks(result: Reproduction) -> Figure:
-    """Draw Fig 5: tracks of slave and leaders, and the errors of one run across and along them."""
+    """Draw Fig 5: tracks of slave and leaders, and the errors of one run."""
     over = result.over_time
     shown = slice(0, _SHOWN)
     figure = plots.new_figure((8.4, 5.0), "Fig. 5: tracks, 5 % of the ranges at 10 sigma")
@@ -28,13 +31,17 @@ def tracks(result: Reproduction) -> Figure:
     plots.style_plane(fleet)
     hours = np.arange(1, 1 + len(over.slave[shown])) / 3600.0  # steps of 1 s
     panels = figure.add_subplot(grid[0, 1]), figure.add_subplot(grid[1, 1])
-    for name, error in over.errors.items():
-        ways = plots.off_track(over.slave[shown], over.slave[shown] + error[shown])
-        for panel, off in zip(panels, ways, strict=True):
-            panel.plot(hours, off, color=KERNEL_COLOURS[name], label=LABELS[name], linewidth=0.9)
-    for panel, way in zip(panels, ("across", "along"), strict=True):
+    for panel, axis, which in zip(panels, range(2), "xy", strict=True):
+        for name, error in over.errors.items():
+            panel.plot(
+                hours,
+                error[shown, axis],
+                color=KERNEL_COLOURS[name],
+                label=LABELS[name],
+                linewidth=0.9,
+            )
         panel.axhline(0.0, color=plots.BLACK, linewidth=0.8, zorder=1)
-        plots.style(panel, ylabel=f"{way} the track, one run / m")
+        plots.style(panel, ylabel=f"{which} error, one run / m")
     panels[0].tick_params(labelbottom=False)
     panels[1].set_xlabel("time / h")
     plots.legend_below(figure, panels[0], columns=4)
@@ -120,6 +127,9 @@ def consistency(result: Reproduction) -> Figure:
         names = [f"Q x {q:g}, R x {r:g}" for q, r in factors]
         panel.set_xticks(np.arange(len(factors)), names, rotation=20, fontsize=8)
         panel.set_yscale("log")
+        panel.yaxis.set_major_locator(FixedLocator(_RATIOS))
+        panel.yaxis.set_minor_locator(NullLocator())
+        panel.yaxis.set_major_formatter("{x:g}")
         panel.set_title(which.upper(), fontsize=10, loc="left")
         plots.style(panel)
     panels[0].set_ylabel("mean / expectation, 95 % bounds in grey")

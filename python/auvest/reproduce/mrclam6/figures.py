@@ -24,7 +24,7 @@ def longest(tracks: list[Track]) -> list[int]:
 
 def some_tracks(result: Reproduction) -> Figure:
     """Draw slave (thin) and master (thick) of the longest tracks: truth and estimates."""
-    figure = plots.new_figure((12.0, 8.0), "Slave (thin) and master (thick): truth and estimates")
+    figure = plots.new_figure((8.4, 6.4), "Slave (thin) and master (thick): truth and estimates")
     panels = figure.subplots(2, _PANELS // 2, squeeze=False).ravel()
     for panel, k in zip(panels, longest(result.tracks), strict=False):
         track = result.tracks[k]

@@ -17,7 +17,7 @@ def _crossing_figure(cases: Cases) -> Figure:
     colours = {"told": plots.GREY, **plots.SLAT_COLOURS}
     sonar = cases.results["crossing"][0]
     figure = plots.new_figure(
-        (11.0, 4.6),
+        (8.4, 4.6),
         f"Two masters that cross, {sonar['sigma_range_m']:g} m and "
         f"{sonar['sigma_bearing_rad']:g} rad",
     )
@@ -50,7 +50,7 @@ def _turning_figure(cases: Cases) -> Figure:
         "constant velocity": plots.GREEN,
         "IMM": plots.VERMILION,
     }
-    figure = plots.new_figure((11.0, 4.6), "A master that turns, EKF-SLAT: relative error")
+    figure = plots.new_figure((8.4, 4.6), "A master that turns, EKF-SLAT: relative error")
     panels = figure.subplots(1, 2)
     for axes, case, label in zip(panels, cases.results["turning"], ("False", "True"), strict=True):
         for row in case["models"]:

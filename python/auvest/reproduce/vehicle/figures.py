@@ -20,7 +20,7 @@ _SHOWN = {
 
 def closed_loop(result: Reproduction) -> Figure:
     """Draw the settled cross-track error of every row, with the prototype's as marks."""
-    figure = plots.new_figure((9.5, 5.5), "Settled cross-track error, mean over the runs")
+    figure = plots.new_figure((8.4, 5.2), "Settled cross-track error, mean over the runs")
     panels = figure.subplots(1, 2, sharey=True)
     for panel, track in zip(panels, mission.TRACKS, strict=True):
         rows = [row for row in result.rows if row.track == track]
@@ -53,7 +53,7 @@ def closed_loop(result: Reproduction) -> Figure:
 
 def tracks(result: Reproduction) -> Figure:
     """Draw one run of three sources: the track, and the error across it."""
-    figure = plots.new_figure((11.0, 4.6), "One run, and its error across the track")
+    figure = plots.new_figure((8.4, 4.4), "One run, and its error across the track")
     plane, cross = figure.subplots(1, 2, width_ratios=(1.0, 1.4))
     corners = mission.LAWNMOWER
     plane.plot(
