@@ -30,7 +30,7 @@ let pending = false; // a frame is asked for
 let next = 0; // timer of the next run
 
 // What a test looks at.
-const seen = { runs: [], checked: null, errors: [] };
+const seen = { runs: [], checked: null, errors: [], rows: () => rows };
 window.auvest = seen;
 window.addEventListener("error", ({ message }) => seen.errors.push(message));
 
@@ -132,14 +132,14 @@ function pause(on) {
 function take(state) {
   rows.push(...state.rows);
   last = state;
-  seen.state = { kind, policy, rows: rows.length, time: state.time, ...state.compared };
+  seen.state = { kind, policy, time: state.time, spent: state.spent, ...state.compared };
   for (const line of state.lines) {
     const className = /^\$(PING|SENSE|READY)/.test(line) ? "ask" : /^\$(STEER|AUV|MIS)/.test(line) ? "tell" : "";
     $("console").append(element("span", { className, textContent: line }));
   }
   while ($("console").childElementCount > CONSOLE_LINES) $("console").firstChild.remove();
   if (state.done) {
-    seen.runs.push({ ...seen.state, spent: state.spent });
+    seen.runs.push({ ...seen.state, rows: rows.length });
     seed += 1;
     next = setTimeout(start, REST * 1000);
   }

@@ -1,4 +1,4 @@
-"""Write the record that the page checks itself by: a sonar's answers, and what the desk makes of them.
+"""Write the record that the page checks itself by: answers of a sonar, and the bits of the desk.
 
     python -m firmware.browser.trace [--output firmware/browser/trace.json]
 
