@@ -9,6 +9,7 @@ const SPEEDS = [
   [10, "10\u00d7"],
   [0, "max"],
 ];
+const FRAME = 40; // between two drawings at least [ms]: the chip needs the processor, too
 const REST = 3; // between the end of a run and the next [s]
 const CONSOLE_LINES = 9;
 
@@ -26,7 +27,7 @@ let strips = [];
 let last = null; // state that the worker has reported
 let settings = {};
 let policy = 0;
-let pending = false; // a frame is asked for
+let pending = false; // a drawing is on its way
 let next = 0; // timer of the next run
 
 // What a test looks at.
@@ -143,7 +144,7 @@ function take(state) {
     seed += 1;
     next = setTimeout(start, REST * 1000);
   }
-  if (!pending) requestAnimationFrame(draw);
+  if (!pending) setTimeout(() => requestAnimationFrame(draw), FRAME);
   pending = true;
 }
 

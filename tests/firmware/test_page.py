@@ -150,10 +150,15 @@ def test_on_a_phone_nothing_is_wider_than_the_screen(opened):
 
 
 @SLOW
-@pytest.mark.parametrize(("show", "time_s"), [("tracking", 60), ("mission", 120)])
+@pytest.mark.parametrize(("show", "time_s"), [("tracking", 45), ("mission", 120)])
 def test_it_runs_at_ten_times_real_time(opened, show, time_s):
-    state = run_to(opened(f"show={show}&speed=0"), time_s)
-    factor = state["time"] / state["spent"]
-    print(f"{show}: {state['time']:.0f} s in {state['spent']:.1f} s, {factor:.0f} times real time")
-    assert state["differing"] == 0
-    assert factor >= 10
+    """Of processor time: other programs may run beside it. What the page draws is counted, too."""
+    tab = opened(f"show={show}&speed=0")
+    tab.wait_for("auvest.checked")
+    before_s, before = tab.processor_s(), run_to(tab, 0)
+    after = run_to(tab, before["time"] + time_s)
+    spent_s = tab.processor_s() - before_s
+    simulated_s = after["time"] - before["time"]
+    print(f"{show}: {simulated_s:.0f} s in {spent_s:.1f} s, {simulated_s / spent_s:.0f} times")
+    assert after["differing"] == 0
+    assert simulated_s / spent_s >= 10
