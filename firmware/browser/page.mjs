@@ -1,6 +1,7 @@
 // The page: what is chosen goes to the worker, what it reports is drawn.
 import workerText from "made/worker.txt";
 import { KINDS } from "./kinds.mjs";
+import { LINES } from "./lines_shown.mjs";
 import { Strip, clear } from "./strip.mjs";
 
 const SPEEDS = [
@@ -9,9 +10,9 @@ const SPEEDS = [
   [10, "10\u00d7"],
   [0, "max"],
 ];
-const FRAME = 40; // between two drawings at least [ms]: the chip needs the processor, too
+const FRAME = 50; // between two drawings at least [ms]: the chip needs the processor, too
+const PLOTTED = 5; // of so many drawings one has the plots, too
 const REST = 3; // between the end of a run and the next [s]
-const CONSOLE_LINES = 9;
 
 const $ = (id) => document.getElementById(id);
 const chosen = new URLSearchParams(location.hash.slice(1));
@@ -28,10 +29,11 @@ let last = null; // state that the worker has reported
 let settings = {};
 let policy = 0;
 let pending = false; // a drawing is on its way
+let drawings = 0;
 let next = 0; // timer of the next run
 
 // What a test looks at.
-const seen = { runs: [], checked: null, errors: [], rows: () => rows };
+const seen = { state: null, runs: [], checked: null, errors: [], rows: () => rows };
 window.auvest = seen;
 window.addEventListener("error", ({ message }) => seen.errors.push(message));
 
@@ -116,7 +118,8 @@ function start() {
   worker.onmessage = ({ data }) => take(data);
   worker.onerror = ({ message }) => seen.errors.push(message);
   rows = [];
-  last = null;
+  last = seen.state = null;
+  drawings = 0;
   $("console").replaceChildren();
   pause(false);
   worker.postMessage({ kind: "speed", speed });
@@ -128,6 +131,7 @@ function pause(on) {
   $("pause").textContent = on ? "Go on" : "Pause";
   $("pause").setAttribute("aria-pressed", String(on));
   worker.postMessage({ kind: "pause", paused });
+  redraw();
 }
 
 function take(state) {
@@ -138,7 +142,7 @@ function take(state) {
     const className = /^\$(PING|SENSE|READY)/.test(line) ? "ask" : /^\$(STEER|AUV|MIS)/.test(line) ? "tell" : "";
     $("console").append(element("span", { className, textContent: line }));
   }
-  while ($("console").childElementCount > CONSOLE_LINES) $("console").firstChild.remove();
+  while ($("console").childElementCount > LINES) $("console").firstChild.remove();
   if (state.done) {
     seen.runs.push({ ...seen.state, rows: rows.length });
     seed += 1;
@@ -173,7 +177,14 @@ function draw() {
   $("factor").textContent = `${(last.time / last.spent).toFixed(0)}\u00d7 real time`;
   $("clock").textContent = last.done ? `${last.time.toFixed(1)} s: done` : `${last.time.toFixed(1)} s`;
   KINDS[kind].map(clear($("map")), rows, last);
-  for (const strip of strips) strip.draw(rows);
+  if (drawings % PLOTTED === 0 || last.done || paused) for (const strip of strips) strip.draw(rows);
+  drawings += 1;
+}
+
+/** All of it, plots too. */
+function redraw() {
+  drawings = 0;
+  draw();
 }
 
 function checked(result) {
@@ -202,7 +213,7 @@ for (const tab of document.querySelectorAll("nav button")) {
     show();
   };
 }
-addEventListener("resize", draw);
+addEventListener("resize", redraw);
 
 const checker = new Worker(blob);
 checker.onmessage = ({ data }) => {

@@ -113,7 +113,7 @@ def test_the_tracking_loop_reacts(opened):
     off = "Math.hypot(...[auvest.rows().at(-1)].map(({ x, wantedX }) => x - wantedX))"
     assert tab.wait_for(f"{off} > 0.3")
     press(tab, "0.5 s")
-    assert tab.wait_for("auvest.state.policy === 2 && auvest.rows().length > 20")
+    assert tab.wait_for("auvest.state?.policy === 2 && auvest.rows().length > 20")
     assert tab.evaluate("auvest.rows().every(({ interval_s }) => interval_s === 0.5)")
     assert run_to(tab, 10)["differing"] == 0
 
@@ -141,7 +141,7 @@ def test_on_a_phone_nothing_is_wider_than_the_screen(opened):
     tab.wait_for("auvest.checked && auvest.rows().length > 3")
     for kind in ("tracking", "mission"):
         tab.evaluate(f"document.querySelector('[data-kind={kind}]').click()")
-        tab.wait_for(f"auvest.state.kind === '{kind}' && auvest.rows().length > 1")
+        tab.wait_for(f"auvest.state?.kind === '{kind}' && auvest.rows().length > 1")
         assert tab.evaluate("document.documentElement.scrollWidth") == 390
         assert tab.evaluate("[...document.querySelectorAll('canvas')].every((c) => c.width > 390)")
         # A thumb's size.
@@ -150,15 +150,15 @@ def test_on_a_phone_nothing_is_wider_than_the_screen(opened):
 
 
 @SLOW
-@pytest.mark.parametrize(("show", "time_s"), [("tracking", 45), ("mission", 120)])
+@pytest.mark.parametrize(("show", "time_s"), [("tracking", 60), ("mission", 120)])
 def test_it_runs_at_ten_times_real_time(opened, show, time_s):
     """Of processor time: other programs may run beside it. What the page draws is counted, too."""
     tab = opened(f"show={show}&speed=0")
     tab.wait_for("auvest.checked")
-    before_s, before = tab.processor_s(), run_to(tab, 0)
-    after = run_to(tab, before["time"] + time_s)
+    press(tab, "Again")
+    before_s = tab.processor_s()
+    state = run_to(tab, time_s)
     spent_s = tab.processor_s() - before_s
-    simulated_s = after["time"] - before["time"]
-    print(f"{show}: {simulated_s:.0f} s in {spent_s:.1f} s, {simulated_s / spent_s:.0f} times")
-    assert after["differing"] == 0
-    assert simulated_s / spent_s >= 10
+    print(f"{show}: {state['time']:.0f} s in {spent_s:.1f} s, {state['time'] / spent_s:.0f} times")
+    assert state["differing"] == 0
+    assert state["time"] / spent_s >= 10
