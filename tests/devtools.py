@@ -123,6 +123,11 @@ class Tab:
             time.sleep(0.1)
         pytest.fail(f"the page did not come to: {script}; trouble: {self.trouble}")
 
+    def processor_s(self) -> float:
+        """Time of processors that pages have taken, their workers and drawing included, s."""
+        processes = self.call("SystemInfo.getProcessInfo", session=None)["processInfo"]
+        return sum(float(p["cpuTime"]) for p in processes if p["type"] == "renderer")
+
     def screenshot(self, path: Path, *, whole: bool = False) -> None:
         """Write a picture of the page, PNG."""
         taken = self.call("Page.captureScreenshot", captureBeyondViewport=whole)

@@ -3,6 +3,7 @@ import { build } from "esbuild";
 import { readFileSync, readdirSync, writeFileSync } from "node:fs";
 import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
+import { dispatch } from "./dispatch.mjs";
 import { bytesOf } from "./hex.mjs";
 
 const [work, page] = process.argv.slice(2);
@@ -24,6 +25,7 @@ async function bundle(entry) {
     alias: { made: work },
     loader: { ".bin": "binary", ".wasm": "binary", ".txt": "text" },
     logLevel: "warning",
+    plugins: [dispatch],
   });
   return made.outputFiles[0].text;
 }

@@ -12,8 +12,12 @@ const OUTLIERS = {
   ...{ name: "outliers", label: "Echoes that come too late", min: 0, max: 30, step: 1, value: 0 },
   ...{ scale: 0.01, show: percent },
 };
+const GATE = 13.8; // kGate of the sketch's config.h
+const NIS_SHOWN = 30; // larger ones are drawn there
 /** Three standard deviations of the position. */
 const spread = (xx, yy) => 3 * Math.sqrt(xx + yy);
+const errorOf = ({ x, y, told }) =>
+  told === undefined ? NaN : Math.hypot(told.x_m - x, told.y_m - y);
 
 export const KINDS = {
   tracking: {
@@ -50,6 +54,13 @@ export const KINDS = {
         series: [
           { colour: COLOURS.estimate, style: "area", value: (row) => spread(row.P00_m2, row.P11_m2) },
           { colour: COLOURS.truth, style: "line", value: (row) => Math.hypot(row.x_m - row.x, row.y_m - row.y) },
+        ],
+      },
+      {
+        ...{ title: "NIS", unit: "2 on average; beyond 13.8 the gate refuses", least: [0, 16] },
+        series: [
+          { colour: COLOURS.track, style: "line", value: () => GATE },
+          { colour: COLOURS.estimate, style: "dots", value: ({ nis }) => Math.min(nis, NIS_SHOWN) },
         ],
       },
     ],
@@ -95,6 +106,13 @@ export const KINDS = {
         series: [
           { colour: COLOURS.truth, style: "line", value: (row) => row.east },
           { colour: COLOURS.estimate, style: "dots", value: (row) => row.told?.current_y_m_s ?? NaN },
+        ],
+      },
+      {
+        ...{ title: "Error of the estimate, and its 3 sigma", unit: "m", least: [0, 1] },
+        series: [
+          { colour: COLOURS.estimate, style: "area", value: ({ told }) => spread(told?.P00_m2, told?.P11_m2) },
+          { colour: COLOURS.truth, style: "line", value: errorOf },
         ],
       },
     ],

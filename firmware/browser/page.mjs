@@ -1,6 +1,7 @@
 // The page: what is chosen goes to the worker, what it reports is drawn.
 import workerText from "made/worker.txt";
 import { KINDS } from "./kinds.mjs";
+import { LINES } from "./lines_shown.mjs";
 import { Strip, clear } from "./strip.mjs";
 
 const SPEEDS = [
@@ -9,8 +10,9 @@ const SPEEDS = [
   [10, "10\u00d7"],
   [0, "max"],
 ];
+const FRAME = 50; // between two drawings at least [ms]: the chip needs the processor, too
+const PLOTTED = 5; // of so many drawings one has the plots, too
 const REST = 3; // between the end of a run and the next [s]
-const CONSOLE_LINES = 9;
 
 const $ = (id) => document.getElementById(id);
 const chosen = new URLSearchParams(location.hash.slice(1));
@@ -26,11 +28,12 @@ let strips = [];
 let last = null; // state that the worker has reported
 let settings = {};
 let policy = 0;
-let pending = false; // a frame is asked for
+let pending = false; // a drawing is on its way
+let drawings = 0;
 let next = 0; // timer of the next run
 
 // What a test looks at.
-const seen = { runs: [], checked: null, errors: [] };
+const seen = { state: null, runs: [], checked: null, errors: [], rows: () => rows };
 window.auvest = seen;
 window.addEventListener("error", ({ message }) => seen.errors.push(message));
 
@@ -115,7 +118,8 @@ function start() {
   worker.onmessage = ({ data }) => take(data);
   worker.onerror = ({ message }) => seen.errors.push(message);
   rows = [];
-  last = null;
+  last = seen.state = null;
+  drawings = 0;
   $("console").replaceChildren();
   pause(false);
   worker.postMessage({ kind: "speed", speed });
@@ -127,23 +131,24 @@ function pause(on) {
   $("pause").textContent = on ? "Go on" : "Pause";
   $("pause").setAttribute("aria-pressed", String(on));
   worker.postMessage({ kind: "pause", paused });
+  redraw();
 }
 
 function take(state) {
   rows.push(...state.rows);
   last = state;
-  seen.state = { kind, policy, rows: rows.length, time: state.time, ...state.compared };
+  seen.state = { kind, policy, time: state.time, spent: state.spent, ...state.compared };
   for (const line of state.lines) {
     const className = /^\$(PING|SENSE|READY)/.test(line) ? "ask" : /^\$(STEER|AUV|MIS)/.test(line) ? "tell" : "";
     $("console").append(element("span", { className, textContent: line }));
   }
-  while ($("console").childElementCount > CONSOLE_LINES) $("console").firstChild.remove();
+  while ($("console").childElementCount > LINES) $("console").firstChild.remove();
   if (state.done) {
-    seen.runs.push({ ...seen.state, spent: state.spent });
+    seen.runs.push({ ...seen.state, rows: rows.length });
     seed += 1;
     next = setTimeout(start, REST * 1000);
   }
-  if (!pending) requestAnimationFrame(draw);
+  if (!pending) setTimeout(() => requestAnimationFrame(draw), FRAME);
   pending = true;
 }
 
@@ -172,7 +177,14 @@ function draw() {
   $("factor").textContent = `${(last.time / last.spent).toFixed(0)}\u00d7 real time`;
   $("clock").textContent = last.done ? `${last.time.toFixed(1)} s: done` : `${last.time.toFixed(1)} s`;
   KINDS[kind].map(clear($("map")), rows, last);
-  for (const strip of strips) strip.draw(rows);
+  if (drawings % PLOTTED === 0 || last.done || paused) for (const strip of strips) strip.draw(rows);
+  drawings += 1;
+}
+
+/** All of it, plots too. */
+function redraw() {
+  drawings = 0;
+  draw();
 }
 
 function checked(result) {
@@ -201,7 +213,7 @@ for (const tab of document.querySelectorAll("nav button")) {
     show();
   };
 }
-addEventListener("resize", draw);
+addEventListener("resize", redraw);
 
 const checker = new Worker(blob);
 checker.onmessage = ({ data }) => {

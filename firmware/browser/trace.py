@@ -1,4 +1,4 @@
-"""Write the record that the page checks itself by: sonar answers, and what the desk makes of them.
+"""Write the record that the page checks itself by: answers of a sonar, and the bits of the desk.
 
     python -m firmware.browser.trace [--output firmware/browser/trace.json]
 
@@ -40,9 +40,9 @@ def trace(samples: int = SAMPLES, seed: int = 1) -> dict[str, Any]:
         first rows (3), NIS and interval.
     """
     sonar = SimulatedSonar(seed=seed)
-    sigma = np.repeat(np.float32([0.05, 0.02, 0.005]), 2)
+    sigma = np.repeat(np.array([0.05, 0.02, 0.005], np.float32), 2)
     estimator = Aukf(
-        np.float32([0.2, 2.0, 0.1, 0.2, 0.01, 0.02]),
+        np.array([0.2, 2.0, 0.1, 0.2, 0.01, 0.02], np.float32),
         np.diag(sigma * sigma),
         process=ConstantAcceleration(discretisation="euler"),
         sensors=RangeBearing(largest_range_m=75.0),
@@ -52,14 +52,14 @@ def trace(samples: int = SAMPLES, seed: int = 1) -> dict[str, Any]:
     )
     answers, words, ticks = [], [], 0
     for sample in range(1, samples + 1):
-        interval = np.float32(estimator.interval)
-        ticks += int(interval * np.float32(TICKS_PER_S) + np.float32(0.5))
+        interval_s = estimator.interval
+        ticks += int(np.float32(interval_s) * np.float32(TICKS_PER_S) + np.float32(0.5))
         answer = sonar.measure(sample, ticks / TICKS_PER_S)
         if answer is None:
             raise RuntimeError("the paper's sonar loses no answer")
         body = telemetry.body_of(answer[0])
         z = [float(telemetry.number(text)) for text in body.split(",")[2:]]
-        estimator.predict(interval)
+        estimator.predict(interval_s)
         estimator.update(z)
         estimator.feedback(_desired(ticks))
         P = estimator.P
@@ -75,8 +75,7 @@ def _desired(ticks: int) -> np.ndarray[Any, np.dtype[np.float32]]:
     """Give the desired position as the sketch computes it, in float."""
     seconds, rest = divmod(ticks, TICKS_PER_S)
     t = np.float32(seconds) + np.float32(rest) * np.float32(1 / TICKS_PER_S)
-    start, velocity = np.float32([0.2, 2.0]), np.float32([0.1, 0.2])
-    acceleration = np.float32([0.01, 0.02])
+    start, velocity, acceleration = np.array([[0.2, 2.0], [0.1, 0.2], [0.01, 0.02]], np.float32)
     return np.asarray(start + t * (velocity + np.float32(0.5) * acceleration * t))
 
 

@@ -5,7 +5,7 @@ import trackingBudget from "made/tracking_budget.bin";
 import trackingFixed from "made/tracking_fixed.bin";
 import trackingLaw from "made/tracking_law.bin";
 import { check } from "./check.mjs";
-import { FREQUENCY } from "./chip.mjs";
+import { LINES } from "./lines_shown.mjs";
 import { Mission } from "./mission.mjs";
 import { Tracking } from "./tracking.mjs";
 import { World } from "./world.mjs";
@@ -16,7 +16,7 @@ const LOOPS = {
 };
 
 const SLICE = 0.02; // simulated at once [s]
-const BUSY = 12; // of the computer's time between two messages [ms]
+const BUSY = 25; // of the computer's time between two messages [ms]
 const PAUSE = 8; // where the chip is ahead of its time [ms]
 
 let loop = null;
@@ -55,12 +55,11 @@ function report() {
   postMessage({
     kind: "state",
     rows: rows.splice(0),
-    lines: lines.splice(0),
+    lines: lines.splice(0).slice(-LINES),
     done,
     time: chip.time,
     awake: 1 - chip.asleep / chip.cpu.cycles,
     cycles: chip.cpu.cycles,
-    frequency: FREQUENCY,
     flash,
     spent: spent / 1000,
     pairs: tally.pairs,
