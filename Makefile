@@ -115,14 +115,14 @@ library: install ## the Arduino library: a zip in dist/
 # each compiled from nothing: make release PYTHONS="python3.12 python3.13"
 RELEASE_PARTS := wheel library $(shell sed -nE 's/^(docs|page):.*/\1/p' Makefile)
 PYTHONS :=
-release: $(VENV)/.auvest-release ## all that is published, in dist/: wheel, sdist, library, checksums
+release: $(VENV)/.auvest-release ## all that is published, in dist/: packages, documentation, checksums
 	rm -rf dist
 	$(PY) -m build --sdist --no-isolation --outdir dist .
 	$(MAKE) $(RELEASE_PARTS)
 	for python in $(PYTHONS); do \
 	    $$python -m pip wheel --quiet --no-deps --wheel-dir dist dist/auvest-*.tar.gz; \
 	done
-	$(PY) python/release.py dist
+	$(PY) python/release.py dist build/site
 	@cat dist/SHA256SUMS
 
 # The simulated board, and the sketch tracking_loop compiled for it.
