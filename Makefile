@@ -125,14 +125,14 @@ page: install-editable ## the page where the firmware runs: dist/page.html
 # All of them are made anew, so that nothing older is among the checksums. Wheels for further Pythons,
 # each compiled from nothing: make release PYTHONS="python3.12 python3.13"
 PYTHONS :=
-release: $(VENV)/.auvest-release ## all that is published, in dist/: wheel, sdist, library, checksums
+release: $(VENV)/.auvest-release ## all that is published, in dist/: packages, documentation, checksums
 	rm -rf dist
 	$(PY) -m build --sdist --no-isolation --outdir dist .
 	$(MAKE) wheel library page docs
 	for python in $(PYTHONS); do \
 	    $$python -m pip wheel --quiet --no-deps --wheel-dir dist dist/auvest-*.tar.gz; \
 	done
-	$(PY) python/release.py dist
+	$(PY) python/release.py dist build/site
 	@cat dist/SHA256SUMS
 
 # The simulated board, and the sketch tracking_loop compiled for it.

@@ -10,6 +10,7 @@ import argparse
 import hashlib
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tarfile
@@ -26,25 +27,17 @@ from cyclonedx.schema import OutputFormat, SchemaVersion
 from packageurl import PackageURL
 from packaging.requirements import Requirement
 
+# Where the headers of others say their version.
 _MACROS = "Eigen/src/Core/util/Macros.h"
 _EIGEN = tuple(f"EIGEN_{part}_VERSION" for part in ("WORLD", "MAJOR", "MINOR"))
 _CONFIG = "xsimd/config/xsimd_config.hpp"
 _XSIMD = tuple(f"XSIMD_VERSION_{part}" for part in ("MAJOR", "MINOR", "PATCH"))
 
 
-def repair(wheel: Path) -> Path:
-    """Give the wheel the tag of the oldest glibc that has what it calls, in place.
-
-    Raises
-    ------
-    subprocess.CalledProcessError
-        If it needs a library that a system may not have.
-    """
-    before = set(wheel.parent.glob("*.whl"))
+def repair(wheel: Path) -> None:
+    """Give the wheel the tag of the oldest glibc that has what it calls, in place."""
     _run("auditwheel", "repair", "--wheel-dir", wheel.parent, wheel)
-    (repaired,) = set(wheel.parent.glob("*.whl")) - before
     wheel.unlink()
-    return repaired
 
 
 def bill_of_materials(wheel: Path, sdist: Path) -> str:
@@ -117,15 +110,18 @@ def checksums(folder: Path) -> str:
     return "".join(f"{digest}  {name}\n" for name, digest in digests.items())
 
 
-def complete(folder: Path) -> None:
-    """Make what `make` has built there ready to be published."""
+def complete(folder: Path, documentation: Path) -> None:
+    """Make what `make` has built there ready to be published, with the site if there is one."""
     for wheel in folder.glob("*-linux_*.whl"):
         repair(wheel)
     wheels = sorted(folder.glob("*.whl"))
     (sdist,) = folder.glob("*.tar.gz")
     _run("twine", "check", "--strict", *wheels, sdist)
     bom = bill_of_materials(wheels[0], sdist)
-    (folder / f"{sdist.name.removesuffix('.tar.gz')}.cdx.json").write_text(bom)
+    name = sdist.name.removesuffix(".tar.gz")
+    (folder / f"{name}.cdx.json").write_text(bom)
+    if documentation.is_dir():
+        shutil.make_archive(str(folder / f"{name}-docs"), "zip", documentation)
     sums = folder / "SHA256SUMS"
     sums.unlink(missing_ok=True)
     sums.write_text(checksums(folder))
@@ -141,4 +137,6 @@ def _run(module: str, *arguments: object) -> None:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path, help="with a wheel and a source distribution")
-    complete(parser.parse_args().folder)
+    parser.add_argument("documentation", type=Path, help="the folder of the site")
+    arguments = parser.parse_args()
+    complete(arguments.folder, arguments.documentation)

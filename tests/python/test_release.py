@@ -8,8 +8,9 @@ import sys
 import zipfile
 
 import pytest
-from cyclonedx.model.bom import Bom
 from packaging.requirements import Requirement
+
+Bom = pytest.importorskip("cyclonedx.model.bom", reason="auvest[release]").Bom
 
 
 @pytest.fixture(scope="module")
@@ -18,7 +19,9 @@ def release(root, wheel, sdist, tmp_path_factory):
     folder = tmp_path_factory.mktemp("release")
     for path in (wheel, sdist):
         shutil.copy(path, folder)
-    command = [sys.executable, root / "python" / "release.py", folder]
+    site = tmp_path_factory.mktemp("site")
+    (site / "index.html").write_text("<p>where to begin")
+    command = [sys.executable, root / "python" / "release.py", folder, site]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     return folder
@@ -41,7 +44,7 @@ def test_wheel_says_the_oldest_glibc_that_has_what_it_calls(release, tmp_path, r
 def test_checksums_are_of_all_files(release, run):
     listed = {line.split()[1] for line in (release / "SHA256SUMS").read_text().splitlines()}
     assert listed == {path.name for path in release.iterdir()} - {"SHA256SUMS"}
-    assert len(listed) == 3
+    assert len(listed) == 4
     run("sha256sum", "--check", "--strict", "SHA256SUMS", cwd=release)
     (wheel,) = release.glob("*.whl")
     content = wheel.read_bytes()
@@ -51,6 +54,12 @@ def test_checksums_are_of_all_files(release, run):
             run("sha256sum", "--check", "SHA256SUMS", cwd=release)
     finally:
         wheel.write_bytes(content)
+
+
+def test_documentation_is_one_file(release):
+    (path,) = release.glob("auvest-*-docs.zip")
+    with zipfile.ZipFile(path) as archive:
+        assert archive.read("index.html") == b"<p>where to begin"
 
 
 def test_bill_of_materials_names_what_is_within_and_what_is_asked_for(release, root, run):
