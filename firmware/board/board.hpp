@@ -45,8 +45,8 @@ inline void write(uint8_t byte) {
   barrier();
 }
 
-/// The next byte of the input stream (--input). Past its end the world is asked for more (--raw), or
-/// the run ends as a failure.
+/// The next byte of the input stream (--input). Past its end the world is asked for more (--raw),
+/// or the run ends as a failure.
 inline uint8_t read() {
   barrier();
   return GPIOR2;
