@@ -79,6 +79,52 @@ def test_the_simulated_mega_keeps_every_bit_and_says_what_it_takes(record, folde
     assert share == pytest.approx(leg.microseconds[1:].sum() * 1e-6 / (0.5 * ROWS))
 
 
+@pytest.fixture(scope="module")
+def lost():
+    """A craft that knows its place to 10 km: a ring, then one place; then all is 900 m off.
+
+    Three stations in turn, a craft almost at rest. One range in seven comes a row late.
+    """
+    sensor = auvest.LeaderRange()
+    filter_ = auvest.RobustEkf(
+        [12.0, 9.0], 1e8 * np.eye(2), process=auvest.SpeedHeading(), sensors=sensor,
+        kernel="igg", components=16, late_s=6.0, dtype="float32",
+    )  # fmt: skip
+    late = np.arange(40) % 7 == 3
+    taken = np.arange(40) - late
+    stations = np.array([(0.0, 0.0), (120.0, 0.0), (60.0, 90.0)])[taken % 3]
+    at = np.array([46.0, 53.0]) + taken[:, None] * [0.38, 0.32]
+    z = np.linalg.norm(at - stations, axis=1)[:, None]
+    shift = np.where(taken < 16, 0.0, 900.0)[:, None] * [1.0, 0.0]
+    columns = (np.full(40, 5.0), z, np.tile([0.1, 0.0, 0.7], (40, 1)), stations - shift, 5.0 * late)
+    kept = (np.asarray(column, np.float32) for column in columns)
+    return Record(filter_, (sensor,), np.zeros(40, int), *kept)
+
+
+def test_the_start_that_is_not_known_becomes_a_place_twice(lost):
+    desk = dict(zip(lost.fields, lost.on_desk().T.view(np.float32), strict=True))
+    components, says = desk["components"], desk["convergence"]
+    x = np.column_stack([desk["x[x_m]"], desk["x[y_m]"]])
+    k = np.arange(-1, 40)[:, None]
+    truth = np.array([46.0, 53.0]) + k * [0.38, 0.32] - np.where(k < 16, 0.0, [900.0, 0.0])
+    error = np.linalg.norm(x - truth, axis=1)
+    settled = int(auvest.Convergence.settled)
+    assert components[1] == 16
+    assert (components[8:17] == 1).all()
+    assert error[16] < 0.2
+    assert says[16] == settled
+    assert (components[17:31] > 8).any()  # a ring after the recovery
+    assert error[-1] < 0.2
+    assert says[-1] == settled
+
+
+@pytest.mark.usefixtures("_board")
+def test_the_simulated_mega_finds_its_place_with_the_bits_of_the_desk(lost, folder):
+    leg = hil.run(lost, "atmega2560", folder)
+    assert leg.difference is None
+    assert leg.words.shape == (41, 1 + 2 + 3 + 1 + 1 + 2)
+
+
 def test_cortex_m_keeps_every_bit(record, folder):
     leg = hil.run(record, "cortex-m4f", folder)
     assert leg.difference is None

@@ -19,6 +19,8 @@ Examples
 
   auvest hil logs/goats14 --config goats14 --target atmega2560 --target cortex-m4f
 
+  auvest hil my_echoes --filter slatf2 --target cortex-m4f        a slave that tracks its masters
+
   auvest hil my_log --target serial:/dev/ttyACM0 --rows 500
 
   auvest hil my_log --flags "-mfma -ffp-contract=fast"      would a build like this keep the bits?

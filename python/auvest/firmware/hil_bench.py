@@ -191,20 +191,11 @@ def _places(record: Record, sensors: dict[str, _Sensor]) -> dict[str, str]:
         reset.append(f"  if (status == Status::kOk) status = {several};")
     made_filter = [*_policy(record), f"Filter filter = {_whole(record, inside)};"]
     if record.age is not None:
-        made_filter += [
-            f"constexpr float kLate = {literal(filter_.late_s)};",
-            "using Event = auvest::LateEvent<Seeing, Seen>;",
-            "using Memory ="
-            f" auvest::LateMemory<Seeing, Seen, auvest::EventArray<Event, {_events(record)}>>;",
-            "Memory memory(filter);",
-        ]
+        made_filter += _memory(record)
         predict = f"  Status status = memory.predict(filter, number(2), {given[2:] or '{}'});"
-        # An age may be a sum that was rounded.
-        correct = [
-            "  const float age = number(kAge);",
-            "  if (age > kLate * 1.00001f) return Report(Status::kTimeBackwards);",
-            "  return memory.update(filter, z, seen, age);",
-        ]
+        correct = ["  const float age = number(kAge);"]
+        correct.append("  if (age > kOldest) return Report(Status::kTimeBackwards);")
+        correct.append("  return memory.update(filter, z, seen, age);")
         reset.append("  if (status == Status::kOk) memory.restart(filter);")
     feedback, show = [], []
     if filter_.kernel is not None:
@@ -243,6 +234,16 @@ def _places(record: Record, sensors: dict[str, _Sensor]) -> dict[str, str]:
 
 def _lines(lines: list[str]) -> str:
     return "".join(f"{line}\n" for line in lines)
+
+
+def _memory(record: Record) -> list[str]:
+    """Write what keeps the last events for late measurements."""
+    events = f"auvest::EventArray<auvest::LateEvent<Seeing, Seen>, {_events(record)}>"
+    return [
+        # An age may be a sum that was rounded.
+        f"constexpr float kOldest = {literal(record.filter.late_s)} * 1.00001f;",
+        f"auvest::LateMemory<Seeing, Seen, {events}> memory(filter);",
+    ]
 
 
 def _events(record: Record) -> int:
