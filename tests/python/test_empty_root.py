@@ -89,7 +89,6 @@ def test_sdist_builds_with_a_compiler_alone(sdist, root, empty_root, run):
     listed = [name for part in lists for name in re.findall(r'"([^"]+)"', part)]
     download(packages, *listed, "cmake", "ninja")
     shutil.copy(sdist, packages)
-    inside(
-        "! command -v cmake ninja make; test ! -e /usr/include/eigen3 -a ! -e /usr/include/xsimd"
-    )
+    inside("test ! -e /usr/include/eigen3 -a ! -e /usr/include/xsimd")
+    inside("! command -v cmake ninja make")
     assert same_numbers(inside(install(sdist) + f"venv/bin/{' '.join(COMMAND)}"), run)
