@@ -325,6 +325,7 @@ def test_a_worker_that_may_not_compute_gets_no_task(
 
     # As code: this module is not to be imported there.
     cloudpickle.register_pickle_by_value(sys.modules[__name__])
+    client.wait_for_workers(2, timeout=300)  # the one that another test has killed comes back
     workers = sorted(client.sync(client.scheduler.identity)["workers"])
     client.run(_pretend, pretend, workers=workers[:1])
     said: list[str] = []
