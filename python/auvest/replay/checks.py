@@ -87,7 +87,7 @@ def files(log: LogFolder, settings: Settings) -> list[Finding]:
 def _idle(log: LogFolder, settings: Settings) -> Iterator[Finding]:
     """Name what was set, and is for the other kind of log."""
     kind = "ranging" if log.tracking else "tracking"
-    ranging, tracking = ["odometry", "ranges"], ["fixes", "process", "interval"]
+    ranging, tracking = ["odometry", "ranges", "constants"], ["fixes", "process", "interval"]
     default = Settings()
     for name in ranging if log.tracking else tracking:
         if getattr(settings, name) != getattr(default, name):
