@@ -42,7 +42,7 @@ class OdometryConstants(Odometry):
         If an argument lies outside its range.
     """
 
-    state = STATE
+    state = STATE  # type: ignore[assignment]
 
     speed_state: int = place()
     turn_state: int = place()
