@@ -20,6 +20,7 @@ from auvest.logs import LogFolder
 from auvest.logs.write import write_file
 from auvest.replay import Settings, find_settings, replay, report, settings_from
 from auvest.replay.constants import Constants, Found
+from auvest.replay.water import sound_speed_m_s
 from auvest.reproduce.constants import measure, page, trials
 from auvest.reproduce.constants.measure import Bench, Recording, Row
 
@@ -177,6 +178,40 @@ def test_the_command_says_it(tmp_path: Path) -> None:
     assert told["value"] == pytest.approx(0.07, abs=0.002)
     text = (tmp_path / "out" / "log" / "report.html").read_text(encoding="utf-8")
     assert "constant range_scale" in text
+
+
+def test_the_speed_of_sound() -> None:
+    # Mackenzie's (1981) formula, another fit: 1550.744 m/s at 25 °C, 35 psu and 1000 m.
+    assert sound_speed_m_s(25.0, 35.0, 1000.0) == pytest.approx(1550.744, abs=1.0)
+    # Fresh water at 20 °C: 1482.3 m/s (Del Grosso and Mader 1972).
+    assert sound_speed_m_s(20.0, 0.0, 0.0) == pytest.approx(1482.3, abs=1.0)
+    assert sound_speed_m_s([4, 20], 35, [0, 100]).shape == (2,)
+    for bad in ((-1, 35, 0), (36, 35, 0), (10, 46, 0), (10, 35, 1001), (10, 35, np.nan)):
+        with pytest.raises(ValueError, match="where the formula holds"):
+            sound_speed_m_s(*bad)
+
+
+def test_ranges_are_corrected_by_the_water(tmp_path: Path) -> None:
+    log = trials.write(tmp_path, "range_scale", 0.0, 0)
+    plain = replay(log, trials.settings({}), causes=False).numbers["rmse_m"]
+    # The instrument took 1500 m/s; sound was slower in the cold water above and faster below.
+    water_s, temperature = np.array([0.0, 900.0]), np.array([4.0, 25.0])
+    write_file(tmp_path, "water.csv", time_s=water_s, temperature_c=temperature)
+    write_file(tmp_path, "depth.csv", time_s=water_s, depth_m=np.array([-0.1, 0.0]))
+    path = tmp_path / "ranges.csv"
+    table = np.loadtxt(path, delimiter=",", skiprows=1)
+    speed = np.interp(table[:, 0], water_s, sound_speed_m_s(temperature, 35.0, 0.0))
+    write_file(tmp_path, "ranges.csv", time_s=table[:, 0], source=table[:, 1],
+               range_m=table[:, 2] * 1500.0 / speed)  # fmt: skip
+    mended = replay(LogFolder(tmp_path), trials.settings({}), causes=False).numbers["rmse_m"]
+    assert mended == pytest.approx(plain, rel=0.01)
+    (tmp_path / "water.csv").unlink()
+    assert (
+        replay(LogFolder(tmp_path), trials.settings({}), causes=False).numbers["rmse_m"] > 2 * plain
+    )
+    write_file(tmp_path, "water.csv", time_s=water_s, temperature_c=temperature - 8)
+    with pytest.raises(ValueError, match=r"water\.csv.*temperature_c must lie in 0\.\.35"):
+        replay(LogFolder(tmp_path), trials.settings({}), causes=False)
 
 
 @needs_data

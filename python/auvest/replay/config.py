@@ -193,6 +193,14 @@ class DepthSettings:
 
 
 @dataclass(frozen=True, kw_only=True)
+class WaterSettings:
+    """Where water.csv tells the speed of sound: what the instrument took, and what is not told."""
+
+    assumed_m_s: float = positive(1500.0)  # by which the ranges were made
+    salinity_psu: float = not_negative(35.0)  # where the file has none
+
+
+@dataclass(frozen=True, kw_only=True)
 class ProcessSettings:
     """Driving noise of a tracked craft, as of :class:`auvest.ConstantAcceleration`.
 
@@ -252,6 +260,7 @@ class Settings:
     positions: PositionSettings = PositionSettings()
     velocities: VelocitySettings = VelocitySettings()
     depth: DepthSettings = DepthSettings()
+    water: WaterSettings = WaterSettings()
     process: ProcessSettings = ProcessSettings()
     interval: IntervalSettings = IntervalSettings()
     log: LogSettings = LogSettings()

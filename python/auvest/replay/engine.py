@@ -46,6 +46,7 @@ from auvest.replay.smoothing import Heading, Smoothing, Track
 from auvest.replay.sources import Sources
 from auvest.replay.tables import Batch, Columns
 from auvest.replay.thinning import SAME_S, Thinning
+from auvest.replay.water import range_changes
 
 #: Velocity odometry is gone through in small steps: so many at once, so that memory stays bounded.
 _STEPS = 32768
@@ -832,7 +833,10 @@ def _placed(positions: Measured) -> Rows:
 
 
 def _early(log: LogFolder, settings: Settings) -> LogFolder:
-    """Give the log with the lines of what drives, or levels, at the times that they are about."""
+    """Give the log with lines at the times that they are about, and ranges by the sound's speed.
+
+    Of the lines those are meant that drive, or level.
+    """
     latencies = {
         "odometry.csv": settings.odometry.latency_s,
         "compass.csv": settings.compass.latency_s,
@@ -845,7 +849,9 @@ def _early(log: LogFolder, settings: Settings) -> LogFolder:
         for name, late in latencies.items()
         if late > 0 and name in log
     }
-    return ChangedLog(log, changes) if changes else log
+    log = ChangedLog(log, changes) if changes else log
+    sounded = range_changes(log, settings)
+    return ChangedLog(log, sounded) if sounded else log
 
 
 def _before(late_s: float, rows: Rows) -> Rows:
