@@ -114,6 +114,8 @@ def test_an_error_is_found(tmp_path: Path, error: trials.Error) -> None:
     if error.name != "compass_offset_rad":  # without it the start's heading takes it
         assert found.numbers["rmse_m"] < 0.2 * ignored.numbers["rmse_m"]
     assert f"constant {error.name}" in dict(report.rows(found))
+    if error.name == "compass_offset_rad":  # looked for in memory, with the start as it was
+        assert replay(log, looks).numbers["rmse_m"] == found.numbers["rmse_m"]
     # Where there is none, that is said.
     clean = trials.write(tmp_path / "clean", error.name, 0.0, 0)
     (told,) = replay(clean, looks, causes=False).numbers["constants"]

@@ -102,22 +102,20 @@ class Constants:
         """Give the place of the offset of a source's ranges: its own, else that of all."""
         return self.place(f"range_offset_m.{source}") or self.place("range_offset_m")
 
-    def require(self, log: LogFolder, *, told: bool, steered: bool) -> None:
+    def require(self, log: LogFolder, *, steered: bool) -> None:
         """Refuse constants of what a log has not.
 
         Parameters
         ----------
         log : LogFolder
             The log.
-        told : bool
-            Whether its compass says how the craft is headed at the start.
         steered : bool
-            Whether headings say how it turns.
+            Whether headings say how the craft turns.
         """
-        if self._compass > 0 and not told:
+        if self._compass > 0 and not steered:
             raise ValueError(
-                "[constants] compass_offset_rad: no compass says how the craft is headed at the "
-                f"start of {log.path}"
+                "[constants] compass_offset_rad: no compass says how the craft is headed in "
+                f"{log.path}"
             )
         if steered and self.place("turn_offset_rad_s"):
             raise ValueError(

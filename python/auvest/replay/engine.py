@@ -340,8 +340,6 @@ class Localiser(Replay):
     start.csv or at the first line of a truth that has headings.
     """
 
-    _told_by_compass = False
-
     def __init__(self, log: LogFolder, settings: Settings, filter_name: FilterName) -> None:
         if filter_name == "aukf":
             raise ValueError("filter aukf chooses when to take a fix; this log has ranges: use ukf")
@@ -351,7 +349,7 @@ class Localiser(Replay):
         compass = "compass.csv" in log
         self._motion = Motion(log["odometry.csv"], time, settings.odometry, compass=compass)
         self._constants = Constants(settings)
-        self._constants.require(log, told=self._told_by_compass, steered=self._motion.steered)
+        self._constants.require(log, steered=self._motion.steered)
         models: dict[str, Any] = {"process": self._constants.process}
         models["sensors"] = self._own_sensors()
         own = settings.start
@@ -388,7 +386,6 @@ class Localiser(Replay):
 
     def _headed(self, name: str) -> tuple[float, float, float, float]:
         """Give the start at the first place of a file, headed as the compass says then."""
-        self._told_by_compass = True
         time, x, y = self._first_place(name)
         table = self.log["compass.csv" if "compass.csv" in self.log else "odometry.csv"]
         before: list[tuple[float, float]] = []
@@ -464,9 +461,9 @@ class Localiser(Replay):
         # between.
         after = np.searchsorted(times, fused.time_s, side="right")
         time = np.insert(times, after, fused.time_s)
-        states = self._x.shape[1]
-        x: Floats = np.empty((0, states))
-        covariance: Floats = np.empty((0, states, states))
+        n = self._x.shape[1]
+        x: Floats = np.empty((0, n))
+        covariance: Floats = np.empty((0, n, n))
         mixture = {name: np.empty(0, np.uint8) for name in tables.MIXTURE}
         located = np.empty(0, bool)
         if len(time):
