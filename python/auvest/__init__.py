@@ -53,11 +53,13 @@ if TYPE_CHECKING:
     from auvest.models import LeaderRange as LeaderRange
     from auvest.models import MeasurementModel as MeasurementModel
     from auvest.models import Odometry as Odometry
+    from auvest.models import OdometryConstants as OdometryConstants
     from auvest.models import PlanarHull as PlanarHull
     from auvest.models import Position as Position
     from auvest.models import ProcessModel as ProcessModel
     from auvest.models import RangeBearing as RangeBearing
     from auvest.models import RangeBearingElevation as RangeBearingElevation
+    from auvest.models import ScaledRange as ScaledRange
     from auvest.models import SpeedHeading as SpeedHeading
     from auvest.models import SpeedHeadingCurrent as SpeedHeadingCurrent
     from auvest.models import WhiteAcceleration as WhiteAcceleration
@@ -113,6 +115,7 @@ else:
         "Mixture": "filters",
         "ModelError": "errors",
         "Odometry": "models",
+        "OdometryConstants": "models",
         "Outage": "slat",
         "PiecewiseAcceleration": "slat.models",
         "PlanarHull": "models",
@@ -132,6 +135,7 @@ else:
         "Slatf": "slat",
         "SlatfJoint": "slat",
         "Sonar": "slat.models",
+        "ScaledRange": "models",
         "SpeedHeading": "models",
         "SpeedHeadingCurrent": "models",
         "Status": "_core",

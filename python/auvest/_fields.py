@@ -23,25 +23,25 @@ class Checked:
                 object.__setattr__(self, entry.name, value)
 
 
-def _field(default: Any, take: Take, **schema: Any) -> Any:
+def taken(default: Any, take: Take, **schema: Any) -> Any:
     """Describe a field; ``schema`` says in JSON Schema what it takes."""
     return field(default=default, metadata={"take": take, "schema": schema})
 
 
 def number(default: float | None) -> Any:
     """Take a finite number; None as a default stands for nothing."""
-    return _field(default, as_number, type="number")
+    return taken(default, as_number, type="number")
 
 
 def positive(default: float | None, *, infinite: bool = False) -> Any:
     """Take a number above 0; None as a default stands for nothing."""
     take = partial(as_number, bound="positive", infinite=infinite)
-    return _field(default, take, type="number", exclusiveMinimum=0)
+    return taken(default, take, type="number", exclusiveMinimum=0)
 
 
 def not_negative(default: float | None) -> Any:
     """Take a finite number of at least 0; None as a default stands for nothing."""
-    return _field(default, partial(as_number, bound="not negative"), type="number", minimum=0)
+    return taken(default, partial(as_number, bound="not negative"), type="number", minimum=0)
 
 
 def fraction(default: float) -> Any:
@@ -53,29 +53,29 @@ def fraction(default: float) -> Any:
             raise ValueError(f"{name} must lie in 0..1, not {value}")
         return value
 
-    return _field(default, take, type="number", minimum=0, maximum=1)
+    return taken(default, take, type="number", minimum=0, maximum=1)
 
 
 def integer(default: int, low: int, high: int) -> Any:
     """Take an integer from ``low`` to ``high``."""
     take = partial(as_integer, low=low, high=high)
-    return _field(default, take, type="integer", minimum=low, maximum=high)
+    return taken(default, take, type="integer", minimum=low, maximum=high)
 
 
 def flag(default: bool) -> Any:
     """Take True or False."""
-    return _field(default, as_flag, type="boolean")
+    return taken(default, as_flag, type="boolean")
 
 
 def choice(default: str, *others: str) -> Any:
     """Take one of a few names."""
     kinds = (default, *others)
-    return _field(default, partial(as_kind, kinds=kinds), enum=list(kinds))
+    return taken(default, partial(as_kind, kinds=kinds), enum=list(kinds))
 
 
 def pair(default: Any) -> Any:
     """Take two finite numbers, for example a position."""
-    return _field(as_pair("default", default), as_pair)
+    return taken(as_pair("default", default), as_pair)
 
 
 def instance(of: type) -> Any:

@@ -66,6 +66,9 @@ COMMANDS: Mapping[tuple[str, ...], str] = {
     ("reproduce", "calibration"): (
         "Make the noises of the settings ten times off, and calibrate them by the recordings."
     ),
+    ("reproduce", "constants"): (
+        "Find what instruments are off by, in simulated surveys and in the recordings."
+    ),
     ("reproduce", "vehicle"): (
         "Fly the vehicle that the AUKF paper describes: what each estimate is worth in the loop."
     ),

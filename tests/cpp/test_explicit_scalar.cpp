@@ -389,6 +389,43 @@ TEST_CASE("explicit scalar: a hull as a process") {
   CHECK(run_planar_hull<ExplicitDouble>() == run_planar_hull<double>());
 }
 
+/// Odometry whose speed and ranges are off by a constant each.
+template <class Scalar>
+std::vector<double> run_constants() {
+  using Process = auvest::OdometryConstants<Scalar>;
+  typename Process::Params params;
+  params.speed_state = Scalar(3);
+  params.turn_state = Scalar(4);
+  auvest::Ekf<Process> filter{Process(params)};
+  typename Process::State x;
+  typename Process::Covariance P;
+  for (int i = 0; i < 8; ++i) {
+    x(i) = Scalar(0);
+    for (int j = 0; j < 8; ++j) P(i, j) = Scalar(i == j ? 0.1 : 0);
+  }
+  REQUIRE(filter.reset(x, P) == auvest::Status::kOk);
+  typename Process::Input input;
+  input(0) = Scalar(1);
+  input(1) = Scalar(0.1);
+  input(2) = Scalar(0.05);
+  typename auvest::ScaledRange<Scalar, 8>::Params range;
+  range.leader_x_m = Scalar(20);
+  range.scale_state = Scalar(5);
+  range.offset_state = Scalar(6);
+  std::vector<double> numbers;
+  for (int k = 0; k < 5; ++k) {
+    REQUIRE(filter.predict(Scalar(0.5), input) == auvest::Status::kOk);
+    const auto report = filter.update(Scalar(19 - k), auvest::ScaledRange<Scalar, 8>(range));
+    REQUIRE(report.status == auvest::Status::kOk);
+    for (int i = 0; i < 8; ++i) numbers.push_back(double(filter.x()(i)));
+  }
+  return numbers;
+}
+
+TEST_CASE("explicit scalar: odometry with constants") {
+  CHECK(run_constants<ExplicitDouble>() == run_constants<double>());
+}
+
 /// Guidance and control over a plan, with the model-aided filter between them.
 template <class Scalar>
 std::vector<double> run_guidance() {

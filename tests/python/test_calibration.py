@@ -132,6 +132,21 @@ def test_which_noises_a_log_tells(tmp_path: Path) -> None:
     assert named == ["process.velocity_psd", "process.acceleration_psd", *fixes]
 
 
+def test_how_far_a_noise_is_told() -> None:
+    # A parabola in the logarithm, looked at where it has fallen by 1 and by 4: 2.25 are at 1.5.
+    falling = [(math.exp(k), -float(k * k)) for k in range(-2, 3)]
+    low, high = calibration._told(falling, 2.25)
+    assert low == pytest.approx(math.exp(-1.5))
+    assert high == pytest.approx(math.exp(1.5))
+    # Flat below: not told there. A place that is a little better than the one found is no matter.
+    flat = [(0.1, -0.2), (0.5, 0.3), (1.0, 0.0), (2.0, 0.1), (8.0, -4.0)]
+    low, high = calibration._told(flat, 1.0)
+    assert low is None
+    assert high == pytest.approx(2.0 * 4**0.5)
+    # A filter that cannot go there refuses it.
+    assert calibration._told([(0.5, -math.inf), (1.0, 0.0)], 1.0) == (0.5, None)
+
+
 def test_a_source_keeps_its_ratio() -> None:
     settings = settings_from({"ranges": {"sigma_m": 2.0, "sources": {"7": {"sigma_m": 3.0}}}})
     changed = with_noises(settings, [Noise("ranges", "sigma_m")], [0.5])

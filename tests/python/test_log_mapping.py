@@ -470,7 +470,7 @@ def test_the_shipped_schema_is_that_of_the_settings() -> None:
         "description": "x east, y north; ned: x north, y east",
     }
     source = made["ranges"]["properties"]["sources"]["patternProperties"]["^[0-9]+$"]
-    assert set(source["properties"]) == {"sigma_m", "latency_s"}
+    assert set(source["properties"]) == {"sigma_m", "latency_s", "constant_offset_m"}
     assert "compass_rad" in made["columns"]["properties"]["odometry"]["properties"]
     assert made["units"]["properties"]["depth"]["properties"]["depth_m"]["enum"][0] == "m"
 

@@ -36,7 +36,8 @@ def places(text: str) -> set[str]:
 
 def test_there_is_a_template_for_each_command() -> None:
     assert [path.name for path in FOLDERS] == [
-        "aukf", "intervals", "logs", "mekf", "mistakes", "mrclam6", "slatf", "vehicle",
+        "aukf", "calibration", "constants", "intervals", "logs", "mekf", "mistakes", "mrclam6",
+        "slatf", "vehicle",
     ]  # fmt: skip
 
 

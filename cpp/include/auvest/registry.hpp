@@ -13,10 +13,12 @@
 #include "auvest/models/heading_speed.hpp"
 #include "auvest/models/leader_range.hpp"
 #include "auvest/models/odometry.hpp"
+#include "auvest/models/odometry_constants.hpp"
 #include "auvest/models/planar_hull.hpp"
 #include "auvest/models/position.hpp"
 #include "auvest/models/range_bearing.hpp"
 #include "auvest/models/range_bearing_elevation.hpp"
+#include "auvest/models/scaled_range.hpp"
 #include "auvest/models/speed_heading.hpp"
 #include "auvest/models/speed_heading_current.hpp"
 #include "auvest/models/white_acceleration.hpp"
@@ -30,6 +32,7 @@
   X("SpeedHeadingBiasScale", SpeedHeading<Scalar, true, true>) \
   X("SpeedHeadingCurrent", SpeedHeadingCurrent<Scalar>)        \
   X("Odometry", Odometry<Scalar>)                              \
+  X("OdometryConstants", OdometryConstants<Scalar>)            \
   X("WhiteAcceleration2", WhiteAcceleration<Scalar, 2>)        \
   X("WhiteAcceleration3", WhiteAcceleration<Scalar, 3>)        \
   X("PlanarHull", PlanarHull<Scalar>)
@@ -43,4 +46,5 @@
   X("BodyVelocity2", N == 4 || N == 6, BodyVelocity<Scalar, N, 2>)     \
   X("BodyVelocity3", N == 6, BodyVelocity<Scalar, N, 3>)               \
   X("RangeBearingElevation", N == 6, RangeBearingElevation<Scalar, N>) \
-  X("HeadingSpeed", N == 8, HeadingSpeed<Scalar, N>)
+  X("HeadingSpeed", N == 8, HeadingSpeed<Scalar, N>)                   \
+  X("ScaledRange", N == 8, ScaledRange<Scalar, N>)

@@ -122,6 +122,8 @@ COLUMNS: Mapping[str, Column] = {
         _length("sigma_m", low=0),
         Column("sigma_velocity_m_s", 0, 50, "millimetres per second?", cause="millimetres"),
         Column("sigma_acceleration_m_s2", 0, 100),
+        Column("temperature_c", -5, 60, "kelvin?"),
+        Column("salinity_psu", 0, 60),
         Column("latitude_deg", -90, 90),
         Column("longitude_deg", -360, 360),
     )
@@ -164,6 +166,7 @@ FILES: Mapping[str, tuple[Layout, ...]] = {
     "plans.csv": (_layout("time_s,source,ax_m_s2,ay_m_s2"),),
     "velocities.csv": (_layout("time_s,forward_m_s,left_m_s,heading_rad", "down_m_s"),),
     "depth.csv": (_layout("time_s,depth_m"),),
+    "water.csv": (_layout("time_s,temperature_c", "salinity_psu"),),
     "beacons.csv": (_layout("source,x_m,y_m", "depth_m"),),
     "leaders.csv": (_layout("time_s,source,x_m,y_m", "sigma_m,depth_m"),),
     "start.csv": (_layout("time_s,x_m,y_m,heading_rad"), _layout("time_s,x_m,y_m")),

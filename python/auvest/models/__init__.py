@@ -12,10 +12,12 @@ from auvest.models.functions import FunctionProcess, FunctionSensor, from_names
 from auvest.models.heading_speed import HeadingSpeed
 from auvest.models.leader_range import LeaderRange
 from auvest.models.odometry import Odometry
+from auvest.models.odometry_constants import OdometryConstants
 from auvest.models.planar_hull import PlanarHull
 from auvest.models.position import Position
 from auvest.models.range_bearing import RangeBearing
 from auvest.models.range_bearing_elevation import RangeBearingElevation
+from auvest.models.scaled_range import ScaledRange
 from auvest.models.speed_heading import SpeedHeading
 from auvest.models.speed_heading_current import SpeedHeadingCurrent
 from auvest.models.white_acceleration import WhiteAcceleration
@@ -26,6 +28,7 @@ PROCESSES: dict[str, type[ProcessModel]] = {
     for model in (
         ConstantAcceleration,
         Odometry,
+        OdometryConstants,
         PlanarHull,
         SpeedHeading,
         SpeedHeadingCurrent,
@@ -42,6 +45,7 @@ SENSORS: dict[str, type[MeasurementModel]] = {
         Position,
         RangeBearing,
         RangeBearingElevation,
+        ScaledRange,
     )
 }
 
@@ -85,11 +89,13 @@ __all__ = [
     "MeasurementModel",
     "Model",
     "Odometry",
+    "OdometryConstants",
     "PlanarHull",
     "Position",
     "ProcessModel",
     "RangeBearing",
     "RangeBearingElevation",
+    "ScaledRange",
     "SpeedHeading",
     "SpeedHeadingCurrent",
     "WhiteAcceleration",

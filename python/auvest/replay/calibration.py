@@ -468,7 +468,9 @@ def _told(profile: list[tuple[float, float]], less: float) -> tuple[float | None
                 if not math.isfinite(below):
                     return outer
                 # Near its top the likelihood falls with the square: between two points, its root.
-                share = (less**0.5 - (-above) ** 0.5) / ((-below) ** 0.5 - (-above) ** 0.5)
+                # What the opinion has kept the search from may be above the top.
+                fallen = math.sqrt(max(-above, 0.0))
+                share = (math.sqrt(less) - fallen) / (math.sqrt(-below) - fallen)
                 return math.exp(math.log(inner) + share * math.log(outer / inner))
         return None
 

@@ -24,6 +24,7 @@ from auvest.replay.health import Health, Residuals, findings, health, start_find
 _SECTIONS = {
     "odometry": ("ranging", "echoes"),
     "ranges": ("ranging",),
+    "constants": ("ranging",),
     "fixes": ("tracking",),
     "process": ("tracking",),
     "interval": ("tracking",),

@@ -127,11 +127,24 @@ class CompassSettings:
 
 
 @dataclass(frozen=True, kw_only=True)
+class ConstantSettings:
+    """What instruments are off by, found with the pose: what is known before; 0: not looked for."""
+
+    range_scale: float = not_negative(0.0)  # ranges are 1 + it times the distance, plus the next
+    range_offset_m: float = not_negative(0.0)  # of all sources that have none of their own
+    speed_factor: float = not_negative(0.0)  # what is to be added to that of [odometry]
+    turn_offset_rad_s: float = not_negative(0.0)  # likewise
+    compass_offset_rad: float = not_negative(0.0)  # likewise to that of [compass]
+    walk: float = not_negative(0.0)  # so much of each in an hour
+
+
+@dataclass(frozen=True, kw_only=True)
 class RangeSource:
     """One source of ranges, where it differs from the others."""
 
     sigma_m: float | None = positive(None)
     latency_s: float | None = not_negative(None)
+    constant_offset_m: float | None = positive(None)  # an offset of its own, as of [constants]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -197,6 +210,14 @@ class DepthSettings:
 
     sigma_m: float = positive(0.1)
     latency_s: float = not_negative(0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class WaterSettings:
+    """Where water.csv tells the speed of sound: what the instrument took, and what is not told."""
+
+    assumed_m_s: float = positive(1500.0)  # by which the ranges were made
+    salinity_psu: float = not_negative(35.0)  # where the file has none
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -328,11 +349,13 @@ class Settings:
     start: StartSettings = StartSettings()
     odometry: OdometrySettings = OdometrySettings()
     compass: CompassSettings = CompassSettings()
+    constants: ConstantSettings = ConstantSettings()
     ranges: RangeSettings = RangeSettings()
     fixes: FixSettings = FixSettings()
     positions: PositionSettings = PositionSettings()
     velocities: VelocitySettings = VelocitySettings()
     depth: DepthSettings = DepthSettings()
+    water: WaterSettings = WaterSettings()
     process: ProcessSettings = ProcessSettings()
     interval: IntervalSettings = IntervalSettings()
     sonar: SonarSettings = SonarSettings()

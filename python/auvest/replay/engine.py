@@ -34,19 +34,20 @@ from auvest.logs.reader import Rows
 from auvest.models import (
     ConstantAcceleration,
     MeasurementModel,
-    Odometry,
     ProcessModel,
     RangeBearing,
     WhiteAcceleration,
 )
 from auvest.replay import tables
 from auvest.replay.config import FilterName, IntervalSettings, Settings
+from auvest.replay.constants import Constants, Found
 from auvest.replay.instruments import Instruments, Measured
 from auvest.replay.motion import Motion, Segments, carry, dead_reckon, wrapped
 from auvest.replay.smoothing import Heading, Smoothing, Track
 from auvest.replay.sources import Sources
 from auvest.replay.tables import Batch, Columns
 from auvest.replay.thinning import SAME_S, Thinning
+from auvest.replay.water import range_changes
 
 #: Velocity odometry is gone through in small steps: so many at once, so that memory stays bounded.
 _STEPS = 32768
@@ -344,8 +345,8 @@ class Replay(ABC):
 class Localiser(Replay):
     """A craft that dead-reckons and ranges to beacons and leaders.
 
-    The state is a pose. The run starts at the pose in start.csv or at the first line of a truth
-    that has headings.
+    The state is a pose, and the constants that the settings ask for. The run starts at the pose in
+    start.csv or at the first line of a truth that has headings.
     """
 
     def __init__(self, log: LogFolder, settings: Settings, filter_name: FilterName) -> None:
@@ -356,22 +357,25 @@ class Localiser(Replay):
         self._now = time
         compass = "compass.csv" in log
         self._motion = Motion(log["odometry.csv"], time, settings.odometry, compass=compass)
-        start, noise = settings.start, settings.odometry
-        models: dict[str, Any] = {
-            "process": Odometry(
-                sigma_distance=noise.sigma_distance,
-                sigma_drift=noise.sigma_drift,
-                sigma_turn=noise.sigma_turn,
-                sigma_turned=noise.sigma_turned,
-            ),
-            "sensors": self._own_sensors(),
-        }
-        sigmas = [start.sigma_position_m, start.sigma_position_m, start.sigma_heading_rad]
-        x0, P0 = np.array([x, y, heading]), np.diag(sigmas) ** 2
+        self._constants = Constants(settings)
+        self._constants.require(log, steered=self._motion.steered)
+        models: dict[str, Any] = {"process": self._constants.process}
+        models["sensors"] = self._own_sensors()
+        own = settings.start
+        sigmas = [own.sigma_position_m, own.sigma_position_m, own.sigma_heading_rad]
+        mean, spread = self._constants.begin([x, y, heading], sigmas)
+        x0, P0 = np.array(mean), np.diag(spread) ** 2
         self._filter = _build(filter_name, settings, x0, P0, models, self._late_s)
         self._x, self._P = x0[None], P0[None]
-        self._reckoned = x0[None]  # the pose by dead reckoning alone
-        self._past_s, self._past_x = np.empty(0), np.empty((0, 3))
+        self._reckoned = x0[None, :3]  # the pose by dead reckoning alone
+        self._past_s, self._past_x = np.empty(0), np.empty((0, len(x0)))
+        self._carry = partial(carry, speed_state=self._constants.place("speed_factor"))
+
+    @property
+    def constants(self) -> list[Found]:
+        """What the instruments are off by, as is known now."""
+        deviation = float(self._x[0, 2] - self._reckoned[0, 2])
+        return self._constants.found(self._x[0], self._P[0], deviation)
 
     def _start(self) -> tuple[float, float, float, float]:
         steered = "compass.csv" in self.log or "heading_rad" in self.log["odometry.csv"].names
@@ -466,8 +470,9 @@ class Localiser(Replay):
         # between.
         after = np.searchsorted(times, fused.time_s, side="right")
         time = np.insert(times, after, fused.time_s)
-        x: Floats = np.empty((0, 3))
-        covariance: Floats = np.empty((0, 3, 3))
+        n = self._x.shape[1]
+        x: Floats = np.empty((0, n))
+        covariance: Floats = np.empty((0, n, n))
         mixture = {name: np.empty(0, np.uint8) for name in tables.MIXTURE}
         located = np.empty(0, bool)
         if len(time):
@@ -499,7 +504,7 @@ class Localiser(Replay):
         truth = truth[truth[:, 0] >= self.start[0]]
         errors = self._errors(
             truth,
-            carry(segments, states, at, truth[:, 0]),
+            self._carry(segments, states, at, truth[:, 0]),
             spreads[np.searchsorted(at, truth[:, 0], side="right") - 1],
             carry(segments, reckoned, at, truth[:, 0]),
         )
@@ -507,7 +512,9 @@ class Localiser(Replay):
         track = None
         if self.smoothing is not None:
             before = (self._x, self._P)
-            track = Track(final, at, before, truth[:, :3], partial(carry, segments), heading_of)
+            track = Track(
+                final, at, before, truth[:, :3], partial(self._carry, segments), heading_of
+            )
         self._move_on(at, states, spreads)
         self._reckoned = reckoned[-1:]
         self._motion.forget(self._past_s[0] if len(self._past_s) else self._now)
@@ -535,7 +542,7 @@ class Localiser(Replay):
     ) -> None:
         """Write how far the predictions of what the filter did not get were off."""
         held = np.flatnonzero(columns["outcome"] == tables.HELD_OUT)
-        predicted = carry(segments, states, at, came.taken_s[held])
+        predicted = self._carry(segments, states, at, came.taken_s[held])
         error = columns["held_out_error_m"]
         error[held] = np.hypot(*(predicted - came.place[held, :2]).T) - came.z[held, 0]
         for sensor, seen in ((tables.FIX, _pointed), (tables.POSITION, _placed)):
@@ -832,7 +839,10 @@ def _placed(positions: Measured) -> Rows:
 
 
 def _early(log: LogFolder, settings: Settings) -> LogFolder:
-    """Give the log with the lines of what drives, or levels, at the times that they are about."""
+    """Give the log with lines at the times that they are about, and ranges by the sound's speed.
+
+    Of the lines those are meant that drive, or level.
+    """
     latencies = {
         "odometry.csv": settings.odometry.latency_s,
         "compass.csv": settings.compass.latency_s,
@@ -845,7 +855,9 @@ def _early(log: LogFolder, settings: Settings) -> LogFolder:
         for name, late in latencies.items()
         if late > 0 and name in log
     }
-    return ChangedLog(log, changes) if changes else log
+    log = ChangedLog(log, changes) if changes else log
+    sounded = range_changes(log, settings)
+    return ChangedLog(log, sounded) if sounded else log
 
 
 def _before(late_s: float, rows: Rows) -> Rows:

@@ -24,9 +24,11 @@ from auvest.models import (
     Position,
     RangeBearing,
     RangeBearingElevation,
+    ScaledRange,
 )
 from auvest.replay import tables
 from auvest.replay.config import Settings
+from auvest.replay.constants import Constants
 from auvest.replay.sources import Sources
 
 #: A range shorter than the difference in depth by more than this many sigma is impossible.
@@ -167,6 +169,7 @@ class Instruments:
         self._settings = settings
         self._spatial = spatial
         self._sources = sources
+        self._constants = Constants(settings)
         self._levelled = not spatial and "depth.csv" in log
         self._models: dict[tuple[int, bytes], MeasurementModel] = {}
         self.depths = Depths()
@@ -220,12 +223,16 @@ class Instruments:
         if sensor == tables.RANGE:
             # What a range leaves in the plane may be shorter than the smallest range.
             ranges, levelled = self._settings.ranges, self._levelled
-            return LeaderRange(
-                sigma_range_m=a,
-                sigma_leader_m=b,
-                smallest_range_m=min(ranges.smallest_m, 0.0) if levelled else ranges.smallest_m,
-                largest_range_m=ranges.largest_m,
-            )
+            model: dict[str, Any] = {
+                "sigma_range_m": a,
+                "sigma_leader_m": b,
+                "smallest_range_m": min(ranges.smallest_m, 0.0) if levelled else ranges.smallest_m,
+                "largest_range_m": ranges.largest_m,
+            }
+            if not self._constants:
+                return LeaderRange(**model)
+            scale = self._constants.place("range_scale")
+            return ScaledRange(scale_state=scale, offset_state=int(np.nan_to_num(c)), **model)
         if sensor == tables.FIX and self._spatial:
             return RangeBearingElevation(
                 sigma_range_m=a,
@@ -267,9 +274,17 @@ class Instruments:
             taken, rows, self._per_source(rows, section, "sigma_m")
         )
         return _measured(
-            rows[:, 0], taken, tables.RANGE, [level], places[:, :2], [sigma, places[:, 2]],
+            rows[:, 0], taken, tables.RANGE, [level], places[:, :2],
+            [sigma, places[:, 2], *self._offsets(rows[:, 1])],
             source=rows[:, 1], range_m=rows[:, 2], too_short=short,
         )  # fmt: skip
+
+    def _offsets(self, sources: Rows) -> list[Rows]:
+        """Give the place of the offset of each range in the state, if there are constants."""
+        if not self._constants:
+            return []
+        places = {source: self._constants.offset_of(int(source)) for source in np.unique(sources)}
+        return [np.array([places[source] for source in sources], dtype=np.float64)]
 
     def _fixes(self, table: CsvTable, rows: Rows) -> Measured:
         section = self._settings.fixes

@@ -308,13 +308,18 @@ class Motion:
         self._segments = Segments(s.edges[k:], s.velocity[k:], s.turn_rate[k:])
 
 
-def carry(segments: Segments, poses: Floats, at: Rows, time_s: Rows) -> Rows:
+def carry(
+    segments: Segments, poses: Floats, at: Rows, time_s: Rows, *, speed_state: int = 0
+) -> Rows:
     """Positions (K, 2) at these times by dead reckoning from the last pose before each.
 
-    ``poses`` (N, 3) belong to the times ``at`` (N,), and no segment ends between one of these and
-    the next time that is asked for.
+    ``poses`` (N, 3 or more) belong to the times ``at`` (N,), and no segment ends between one of
+    these and the next time that is asked for. At ``speed_state`` they have what the speed is off
+    by; 0: nowhere.
     """
     k = np.searchsorted(at, time_s, side="right") - 1
     chord, _ = segments.steps(at[k], time_s - at[k])
+    if speed_state > 0:
+        chord = chord * (1 + poses[k, speed_state])
     step = chord * np.exp(1j * poses[k, 2])
     return poses[k, :2] + np.column_stack([step.real, step.imag])

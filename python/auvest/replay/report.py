@@ -16,6 +16,7 @@ from typing import Any
 
 from auvest.registry import filter_named
 from auvest.replay import drawing, tables
+from auvest.replay.constants import Found
 from auvest.replay.health import Health
 from auvest.replay.run import Result
 
@@ -156,6 +157,7 @@ def rows(result: Result) -> list[tuple[str, str]]:
         ("truth within 3 sigma", _share(n["inside_3_sigma"])),
         *_smoothed(n),
         *_masters(n),
+        *((f"constant {one['name']}", Found(**one).text) for one in n.get("constants", ())),
         ("held-out measurements, RMSE", _metres(n["held_out_rmse_m"])),
         ("NIS, mean", _nis(n)),
         ("NIS within three sigma, mean", _nis_within(health)),

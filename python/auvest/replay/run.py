@@ -17,7 +17,7 @@ from auvest.logs.findings import Finding
 from auvest.logs.origin import local_origin, shifted
 from auvest.replay import checks, tables
 from auvest.replay.config import FilterName, Settings
-from auvest.replay.engine import Replay, replay_of
+from auvest.replay.engine import Localiser, Replay, replay_of
 from auvest.replay.health import Health, Residuals, health
 from auvest.replay.samples import Samples
 from auvest.replay.shown import Shown
@@ -49,8 +49,10 @@ class Result:
     numbers : dict
         The figures of the run, see :class:`auvest.replay.tally.Tally`, and ``late``; of a filter
         with several components ``convergence``, at the end, ``settled_s``, when first, and
-        ``settled_rmse_m``, from then on; of one that was smoothed ``smoothed``, with ``lag_s``,
-        ``rmse_m``, ``max_error_m`` and ``inside_3_sigma`` of that track.
+        ``settled_rmse_m``, from then on; of a ranging log ``constants``, each as
+        :class:`auvest.replay.constants.Found` has it, in a list; of one that was smoothed
+        ``smoothed``, with ``lag_s``, ``rmse_m``, ``max_error_m`` and ``inside_3_sigma`` of that
+        track.
     estimates, measurements, errors, outliers : Samples
         At most some ten thousand rows of each table, for figures; ``outliers`` are measurements
         with less than full weight. Measurements have the columns ``tables.SHOWN``, too.
@@ -215,6 +217,8 @@ def replay(
         numbers["smoothed"] = {"lag_s": lag_s, **tally.smoothed()}
     if log.echoing:
         numbers["masters"] = tally.masters()
+    if isinstance(engine, Localiser):
+        numbers["constants"] = [one.document() for one in engine.constants]
     numbers["origin_m"] = None if origin is None else list(origin)
     earth = log.frame.origin
     numbers["origin_deg"] = None if earth is None else list(earth)

@@ -21,10 +21,12 @@
 #include "auvest/models/leader_range.hpp"
 #include "auvest/models/linear.hpp"
 #include "auvest/models/odometry.hpp"
+#include "auvest/models/odometry_constants.hpp"
 #include "auvest/models/piecewise_acceleration.hpp"
 #include "auvest/models/position.hpp"
 #include "auvest/models/range_bearing.hpp"
 #include "auvest/models/range_bearing_elevation.hpp"
+#include "auvest/models/scaled_range.hpp"
 #include "auvest/models/speed_heading.hpp"
 #include "auvest/models/speed_heading_current.hpp"
 #include "auvest/models/white_acceleration.hpp"
@@ -297,6 +299,11 @@ TEST_CASE("process models") {
   check_process(driven(auvest::SpeedHeading<double, true, true>()), 0.5);
   check_process(driven(auvest::SpeedHeadingCurrent<double>()), 0.5);
   check_process(driven(auvest::Odometry<double>()), 0.5);
+  auvest::OdometryConstants<double>::Params off;
+  off.speed_state = 4;
+  off.turn_state = 6;
+  off.walk_0 = 0.3;
+  check_process(driven(auvest::OdometryConstants<double>(off)), 0.5);
   check_process(drifting<double, 2>(), 0.7);
   check_process(drifting<double, 3>(), 0.7);
   Matrix<double, 3, 3> phi;
@@ -307,6 +314,11 @@ TEST_CASE("process models") {
 TEST_CASE("measurement models") {
   check_measurement(sonar(), 100);
   check_measurement(leader<4>(30, -20), 100);
+  auvest::ScaledRange<double, 8>::Params off;
+  off.leader_x_m = 30;
+  off.scale_state = 4;
+  off.offset_state = 7;
+  check_measurement(auvest::ScaledRange<double, 8>(off), 1);
   check_measurement(fix<double, 2, 2>(), 100);
   check_measurement(fix<double, 6, 3>(), 100);
   check_measurement(depth<double, 3>(), 100);

@@ -54,7 +54,7 @@ class Track:
         )
 
 
-def _track(random: np.random.Generator) -> Track:
+def survey(random: np.random.Generator) -> Track:
     """Make a survey of legs that are joined by half circles, from a place off any axis."""
     time = np.arange(0.0, DURATION_S + STEP_S / 2, STEP_S)
     rate = np.zeros(len(time))
@@ -124,7 +124,7 @@ def _ranges(
 
 def leaders(random: np.random.Generator) -> Files:
     """Make a trial with a DVL and a compass, and two leaders that move."""
-    track = _track(random)
+    track = survey(random)
     compass = (
         track.heading
         + random.normal(0, np.radians(0.5))
@@ -165,7 +165,7 @@ def leaders(random: np.random.Generator) -> Files:
 
 def beacons(random: np.random.Generator) -> Files:
     """Make a trial with a log and a gyro, and three beacons."""
-    track = _track(random)
+    track = survey(random)
     count = len(track.time_s)
     places = _around(track, random, 3)
     time = np.arange(2.0, DURATION_S - 3, 2.0)
@@ -192,7 +192,7 @@ def beacons(random: np.random.Generator) -> Files:
 
 def tracking(random: np.random.Generator) -> Files:
     """Make a trial in which two stations track a craft in turn."""
-    track = _track(random)
+    track = survey(random)
     places = _around(track, random, 2)
     time = np.arange(1.0, DURATION_S - 3, 1.0)
     source = 1.0 + np.arange(len(time)) % 2
