@@ -29,7 +29,7 @@ from auvest import (
     UnicycleMotion,
 )
 from auvest.firmware.hil_slat import Newcomer, SlatRecord, steps_of_run
-from auvest.slat import SlatFilter
+from auvest.slat import Lanes, SlatFilter
 from firmware.parity.targets import AVR_PARTICLES, HERE, INCLUDES, MASTERS, PARTICLES, Target
 
 Kind = Literal[
@@ -298,24 +298,25 @@ class Record:
     birth_acceleration_m_s2: float = 0.01
     kept: float = 0.5
 
-    def filter(self, lanes: str) -> SlatFilter:
+    def filter(self, lanes: Lanes) -> SlatFilter:
         """Make it in Python, without the masters; a `Slatf` runs in the lanes of this set."""
         motion = self.motion.pose_states
-        start = self.world.slave["x"], symmetric(self.world.slave["P"], motion)
+        x0, P0 = self.world.slave["x"], symmetric(self.world.slave["P"], motion)
         models: dict[str, Any] = {"motion": self.motion, "sonar": self.sonar, "gate": self.gate}
         models |= {"master": self.master, "dtype": "float32", "recover_after": 0}
         if self.kind.startswith("ekf"):
-            return EkfSlat(*start, **models)
-        particles = {"particles": self.particles, "seed": self.seed}
+            return EkfSlat(x0, P0, **models)
+        particles: dict[str, Any] = {"particles": self.particles, "seed": self.seed}
         particles |= {"resample_below": self.resample_below}
-        joint = {"kept": self.kept, "max_masters": self.room}
+        joint: dict[str, Any] = {"kept": self.kept, "max_masters": self.room}
         if self.kind == "slatf-shared":
             del models["recover_after"]
-            return SlatfJoint(*start, **models, **particles, **joint, covariance="shared")
+            return SlatfJoint(x0, P0, **models, **particles, **joint, covariance="shared")
         if self.kind.startswith("slatf-joint"):
-            return SlatfJoint(*start, **models, **particles, **joint)
+            return SlatfJoint(x0, P0, **models, **particles, **joint)
         return Slatf(
-            *start,
+            x0,
+            P0,
             **models,
             **particles,
             version=1 if self.kind.startswith("slatf1") else 2,

@@ -69,6 +69,8 @@ HEAD = "time_s,source,range_m\n"
         ("", 1, None, "the header must be time_s,source,range_m"),
         ("1,2,3\n", 1, None, "the header must be"),
         ("time_s,source,range_m,range_m\n", 1, None, "the header must be"),
+        (HEAD + '1,0,5\n1,"0"\r,5\n', 3, None, "is no line of cells: new-line character"),
+        ('"time_s"\r,source,range_m\n', 1, None, "is no line of cells: new-line character"),
     ],
 )
 def test_refuses_with_file_line_and_column(

@@ -173,7 +173,7 @@ class CsvTable:
             raise LogError(path, "is not UTF-8 text") from None
         self.bytes_read = 0
         self._refuse_separator(header)
-        self._header = self._cells(header)
+        self._header = self._cells(header, 1)
         self._match(self._named(self._header))
 
     @property
@@ -253,14 +253,17 @@ class CsvTable:
             return np.full(len(rows), default)
         return rows[:, self.names.index(name)]
 
-    def _cells(self, line: str) -> list[str]:
+    def _cells(self, whole: str, line: int) -> list[str]:
         """Part a line where the separator is not between quotes."""
-        text = line.rstrip("\r\n")
+        text = whole.rstrip("\r\n")
         separator = self._reading.separator
         if separator == " ":
             return text.split()
         if '"' in text:
-            return next(csv.reader([text], delimiter=separator), [])
+            try:
+                return next(csv.reader([text], delimiter=separator), [])
+            except csv.Error as error:
+                raise LogError(self.path, f"is no line of cells: {error}", line=line) from None
         return text.split(separator)
 
     def _named(self, header: list[str]) -> dict[str, int]:
@@ -395,7 +398,7 @@ class CsvTable:
         return None
 
     def _parse_line(self, text: str, line: int) -> list[float]:
-        cells = self._cells(text)
+        cells = self._cells(text, line)
         expected = len(self._header)
         if len(cells) != expected:
             comma = len(cells) > expected and all(map(_digits, cells))

@@ -33,6 +33,7 @@ from auvest.logs.findings import Finding
 from auvest.logs.reader import Rows
 from auvest.models import (
     ConstantAcceleration,
+    Depth,
     MeasurementModel,
     ProcessModel,
     RangeBearing,
@@ -626,6 +627,7 @@ class Tracker(Replay):
         if self.spatial:
             x0 = np.array([*position[:3], 0.0, 0.0, 0.0])
             P0 = np.diag(np.repeat(sigmas[:2], 3)) ** 2
+            models["sensors"] = Depth(sigma_m=self.settings.depth.sigma_m)
         else:
             x0 = np.array([*position[:2], 0.0, 0.0, 0.0, 0.0])
             P0 = np.diag(np.repeat(sigmas, 2)) ** 2
