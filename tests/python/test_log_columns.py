@@ -395,6 +395,17 @@ def test_late_fixes_of_a_tracked_craft(tmp_path: Path) -> None:
     assert found["x_m"][-1] == pytest.approx(timely["x_m"][-1] + 1.8, abs=0.05)
 
 
+def test_a_craft_in_space_of_which_nothing_is_known_but_its_start(tmp_path: Path) -> None:
+    log = spatial_log(tmp_path, latency_s=2.0)
+    (log / "beacons.csv").write_text("source,x_m,y_m,depth_m\n")  # nobody knows where it stood
+    for name in ("depth.csv", "velocities.csv"):
+        (log / name).unlink()
+    write_file(log, "start.csv", time_s=[0.0], x_m=[10.0], y_m=[20.0])
+    found = tables(log, settings_from({"fixes": {"latency_s": 2.0}}))
+    assert set(found["measurements"]["outcome"]) == {"no position"}
+    assert set(found["estimates"]["x_m"]) == {10.0}  # at rest, for all that is known
+
+
 def test_fixes_with_depth_and_no_elevation_are_levelled(tmp_path: Path) -> None:
     write_file(tmp_path, "beacons.csv", source=[1], x_m=[0.0], y_m=[0.0])
     time = np.arange(0.0, 20.0)
