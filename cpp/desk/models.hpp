@@ -227,7 +227,28 @@ class RuntimeRobust : public RuntimeSum<Scalar_, N> {
   using Base::update;
 
   Report<Scalar> update(const Vector<Scalar, kMaxSize>& z, const PlacedSensor<Scalar, N>& sensor) {
-    return sensor.model->update(*this, z, sensor);
+    const Vector<Scalar, N> before = this->belief().P.diagonal();
+    const Report<Scalar> report = sensor.model->update(*this, z, sensor);
+    if constexpr (N > 1) {
+      if (report.status == Status::kOk && this->size() > 1) mend_components(before);
+    }
+    return report;
+  }
+
+ private:
+  /// As mend_belief() for the components, which a ring of them may have split off from a covariance
+  /// that is nearly singular.
+  void mend_components(const Vector<Scalar, N>& variances_before) {
+    bool well = true;
+    for (int k = 0; k < this->size(); ++k) well = well && is_well_conditioned(this->component(k).P);
+    if (well) return;
+    auto state = this->state();
+    for (int k = 0; k < this->size(); ++k) {
+      mend_belief<RuntimeGaussian<Scalar, N>>(variances_before, state.mixture.component[k]);
+    }
+    typename Base::BeliefType whole;
+    state.mixture.moments(whole);
+    this->restore(whole, this->rule(), state);
   }
 };
 

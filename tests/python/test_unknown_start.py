@@ -266,6 +266,30 @@ def test_monte_carlo_from_an_unknown_start():
     assert np.hypot(*stuck.error[:, -1].T).min() > 10.0
 
 
+@pytest.mark.parametrize("kind", [auvest.Ekf, auvest.Ukf, auvest.Ckf])
+def test_components_of_a_start_that_is_nearly_singular_have_covariances(kind):
+    # All states hang on the first, known to 1 km: in single precision nothing is left of the others
+    # where components are split off.
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        root = np.tril(rng.uniform(-1, 1, (4, 4))) * np.array([[1], [0.27], [0.004], [0.004]])
+        np.fill_diagonal(root, [1000, 0.01, 0.02, 0.01])
+        f = kind(
+            [56.1, -48.2, 0.0, -2.0],
+            root @ root.T,
+            process=auvest.SpeedHeadingCurrent(),
+            sensors=auvest.LeaderRange(sigma_range_m=0.1),
+            components=8,
+            dtype="float32",
+        )
+        for _ in range(6):
+            f.predict(1.0, [1.0, 0.0, 0.3])
+            f.update(rng.uniform(1, 90), place=rng.uniform(-70, 70, 2))
+            for P in f.mixture.P:
+                np.linalg.cholesky(P.astype(float))
+        f.restore(f.save())
+
+
 def test_wrong_arguments_are_refused_by_name():
     for message, options in {
         r"components must be 1, or at least 8: a ring of 5 has gaps": {"components": 5},
