@@ -57,7 +57,7 @@ PAGES = {
         "speed_vehicle",
         "speed_startup",
     ],
-    "Project": ["contributing", "/CHANGELOG", "Readme </README>"],
+    "Project": ["contributing", "/CHANGELOG", "SECURITY", "Readme </README>"],
 }
 
 FIRMWARE = """\
