@@ -254,7 +254,7 @@ def test_interrupt_and_failed_runs(
     result = call(*arguments)
     assert result.exit_code == 130
     assert result.stdout == ""
-    assert "7 files are written" in result.stderr
+    assert "8 files are written" in result.stderr
 
 
 # auvest simulate slatf.
