@@ -231,8 +231,7 @@ TrackingTwin* new_tracking_twin(int policy) {
   return new PolicyTwin<FixedInterval<float>>();
 }
 
-// ---- The vehicle that is steered
-// -----------------------------------------------------------------
+// ---- The vehicle that is steered ----------------------------------------------------------------
 
 /// Hull and sensors, in a current that is set from outside.
 class SteeredVehicle {
@@ -241,7 +240,8 @@ class SteeredVehicle {
       : seed_(seed),
         scenario_(scenario()),
         begin_(scenario_),
-        world_(scenario_, begin_.place, begin_.heading, seed, 0),
+        world_(scenario_, &mission_detail::launch_hull<SixDof>, begin_.place, begin_.heading, seed,
+               0),
         north_(kShift),
         east_(kShift) {
     north_.aim_at(world_.current.value[0]);
@@ -332,12 +332,12 @@ class SteeredVehicle {
     return s;
   }
 
-  const VehicleTruth& truth() const { return world_.hull.truth(); }
+  const VehicleTruth& truth() const { return world_.truth(); }
 
   uint64_t seed_;
   MissionScenario scenario_;
   Begin begin_;
-  mission_detail::MissionWorld<SixDof> world_;
+  mission_detail::MissionWorld world_;
   Gradual north_, east_;
   double noise_ = 1, outliers_ = 0;
   uint64_t changes_ = 0;

@@ -133,6 +133,7 @@ REGISTRY = [
     ("ekf", "ConstantAcceleration", PLANE),
     ("aukf", "ConstantAcceleration(discretisation='euler')", PLANE),
     ("ekf", "PlanarHull", ("RangeBearing", "HeadingSpeed")),
+    ("robust-ekf", "OdometryConstants", ("ScaledRange",)),
 ]
 #: What drives a process: speed and heading, a way and a turn, rudder and propeller.
 DRIVEN = {"Speed": [1.0, 0.0, 0.5], "Odometry": [1.0, 0.0, 0.5], "PlanarHull": [0.05, 12.0]}
