@@ -352,8 +352,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--times", type=int, default=20, help="kills of each command (20)")
     parser.add_argument("--seed", type=int, default=1, help="of the moments (1)")
-    parser.add_argument("names", nargs="*", default=list(ATTACKS), help="commands (all)")
+    parser.add_argument(
+        "names", nargs="*", help=f"of {', '.join(ATTACKS)}; store is that of Monte Carlo runs (all)"
+    )
     given = parser.parse_args()
+    for name in given.names:
+        if name not in ATTACKS:
+            parser.error(f"no command {name!r}: there are {', '.join(ATTACKS)}")
     wrong = 0
     for name in given.names or ATTACKS:
         root = Path(tempfile.mkdtemp(prefix=f"auvest-kill-{name}-"))
