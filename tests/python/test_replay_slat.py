@@ -218,6 +218,21 @@ def test_the_result_does_not_depend_on_the_chunks(
     np.testing.assert_array_equal(made[0][2]["error_x_m"], made[1][2]["error_x_m"])
 
 
+def test_behind_the_last_echo_means_of_readings_carry_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sea(tmp_path)
+    lines = (tmp_path / "echoes.csv").read_text().splitlines(keepends=True)
+    (tmp_path / "echoes.csv").write_text("".join(lines[:11]))  # 1 s to 19 s
+    monkeypatch.setattr(reader, "CHUNK_LINES", 17)
+    settings = settings_from({**EXACT, "slave": {**EXACT["slave"], "mean_s": 0.5}})
+    result = replay(LogFolder(tmp_path), settings, filter_name="slatf2")
+    time_s = result.estimates.columns()["time_s"]
+    assert time_s[-1] == 60
+    assert np.diff(time_s).max() < 0.75  # half a second, in whole steps
+    assert result.numbers["rmse_m"] < 0.5
+
+
 def test_a_wrong_echo_is_refused_and_named(tmp_path: Path) -> None:
     sea(tmp_path)
     path = tmp_path / "echoes.csv"

@@ -220,7 +220,7 @@ class Companion(Replay):
             ]
             lines = np.concatenate([*parts, [self._line_s] * self._increments])
             return np.unique(np.concatenate([heard, lines[(lines > self._now) & (lines <= limit)]]))
-        ends = np.append(heard, limit) if limit > max(self._now, *heard[-1:]) else heard
+        ends = np.append(heard, limit) if limit > max([self._now, *heard[-1:]]) else heard
         parts = [np.empty(0)]
         for begin, end in zip([self._now, *ends[:-1]], ends, strict=False):
             steps = max(1, round((end - begin) / mean_s))
