@@ -2,23 +2,43 @@
 
 from __future__ import annotations
 
+import json
 import os
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from conftest import ROOT
 
 from auvest.importers.sets import IMPORTERS
 from auvest.logs import LogFolder
 from auvest.replay import find_settings
 from auvest.replay.calibration import calibrate
-from auvest.reproduce.calibration import measure
+from auvest.reproduce.calibration import measure, page
 from auvest.reproduce.calibration.measure import Bench, Figures, Row
 
+PAGE = ROOT / "docs" / "reproduction" / "calibration"
 DATA = os.environ.get("AUVEST_DATA")
 needs_data = pytest.mark.skipif(
     DATA is None, reason="AUVEST_DATA does not name the folder of the validation recordings"
 )
+
+
+def read(name: str) -> Bench:
+    """The bench as results.json has it."""
+    document = json.loads((PAGE / name).read_text(encoding="utf-8"))
+    rows = [
+        Row(**{**row, "wrong": Figures(**row["wrong"]), "right": Figures(**row["right"])})
+        for row in document["rows"]
+    ]
+    return Bench({name: Figures(**one) for name, one in document["documented"].items()}, rows)
+
+
+def test_the_page_is_what_was_measured_and_every_aim_is_reached() -> None:
+    bench = read("results.json")
+    assert set(bench.documented) == set(measure.SETS)
+    assert all(bench.held().values())
+    assert page.page(bench) == (PAGE / "README.md").read_text(encoding="utf-8")
 
 
 def test_what_holds() -> None:
