@@ -227,15 +227,27 @@ class RuntimeRobust : public RuntimeSum<Scalar_, N> {
   using Base::update;
 
   Report<Scalar> update(const Vector<Scalar, kMaxSize>& z, const PlacedSensor<Scalar, N>& sensor) {
-    const Vector<Scalar, N> before = this->belief().P.diagonal();
-    const Report<Scalar> report = sensor.model->update(*this, z, sensor);
     if constexpr (N > 1) {
-      if (report.status == Status::kOk && this->size() > 1) mend_components(before);
+      if (this->params().components > 1) return update_sum(z, sensor);
     }
-    return report;
+    return sensor.model->update(*this, z, sensor);
   }
 
  private:
+  /// Where the moments of the components leave the format, nothing has changed.
+  Report<Scalar> update_sum(const Vector<Scalar, kMaxSize>& z,
+                            const PlacedSensor<Scalar, N>& sensor) {
+    const auto state = this->state();
+    const auto rule = this->rule();
+    const typename Base::BeliefType belief = this->belief();
+    const Report<Scalar> report = sensor.model->update(*this, z, sensor);
+    if (report.status != Status::kOk) return report;
+    if (this->size() > 1) mend_components(belief.P.diagonal());
+    if (math::all_finite(this->belief())) return report;
+    this->restore(belief, rule, state);
+    return Report<Scalar>(Status::kOverflow);
+  }
+
   /// As mend_belief() for the components, which a ring of them may have split off from a covariance
   /// that is nearly singular.
   void mend_components(const Vector<Scalar, N>& variances_before) {
