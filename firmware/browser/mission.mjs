@@ -1,7 +1,6 @@
 // The sketch mission, and at the other end of its line the vehicle that it steers.
-import { Chip } from "./chip.mjs";
-import { Columns, bitsOf, fieldsOf, floatOf, frame } from "./line.mjs";
-import { Tally } from "./tally.mjs";
+import { bitsOf, floatOf, frame } from "./line.mjs";
+import { Session } from "./session.mjs";
 
 const PERIOD = 0.1; // [s]
 const FROM_REST = [0, 0, 15].map(bitsOf); // rudder, planes, propeller before the first command
@@ -15,16 +14,10 @@ const COMPARED = [
 ];
 const WORDS = COMMAND.length + COMPARED.length;
 
-export class Mission {
+export class Mission extends Session {
   /** `policy` is the number of the interval policy that the program has. */
   constructor(world, program, policy, seed) {
-    this.world = world;
-    this.chip = new Chip(program);
-    this.tally = new Tally();
-    this.rows = [];
-    this.lines = [];
-    this.done = false;
-    this.columns = new Columns("MISSION");
+    super(world, program, "MISSION");
     this.sample = 0;
     this.row = null; // of the sample
     this.requested = 0; // when the sample was asked for [s]
@@ -36,7 +29,6 @@ export class Mission {
     world.calls.mission_start(seed, policy);
     const [x, y, heading] = world.numbers;
     this.startBody = `START,${x.toFixed(4)},${y.toFixed(4)},${heading.toFixed(6)}`;
-    this.chip.onLine = (line, time) => this.hear(line, time);
   }
 
   /** Times what the filter expects; probability; the current [m/s] and where it goes [rad]. */
@@ -44,15 +36,10 @@ export class Mission {
     this.world.calls.mission_set(noise, outliers, current, towards);
   }
 
-  hear(line, time) {
-    this.lines.push(line);
-    const fields = fieldsOf(line);
-    if (fields === null) return;
+  react(fields, time) {
     if (fields[0] === "READY") this.begin(time);
     if (fields[0] === "SENSE") this.sense(Number(fields[1]), fields[2] === "1", time);
     if (fields[0] === "STEER") this.steer(Number(fields[1]), fields.slice(2), time);
-    const row = this.columns.read(fields);
-    if (row !== null) this.take(row);
   }
 
   begin(time) {

@@ -1,7 +1,6 @@
 // The sketch tracking_loop, and at the other end of its line a sonar and the vehicle it measures.
-import { Chip } from "./chip.mjs";
-import { Columns, fieldsOf, floatOf, frame } from "./line.mjs";
-import { Tally } from "./tally.mjs";
+import { floatOf, frame } from "./line.mjs";
+import { Session } from "./session.mjs";
 
 /** Columns whose bits are compared, in the order of the words of world.cpp. */
 export const COMPARED = [
@@ -36,23 +35,16 @@ export class TrackingTwin {
   }
 }
 
-export class Tracking {
+export class Tracking extends Session {
   /** `policy` is the number of the interval policy that the program has. */
   constructor(world, program, policy, seed) {
-    this.world = world;
-    this.chip = new Chip(program);
-    this.tally = new Tally();
-    this.rows = [];
-    this.lines = [];
-    this.done = false;
+    super(world, program, "AUV");
     this.start = null;
     this.triggered = 0;
     this.asked = new Map(); // by sample: what is true, and the answer
-    this.columns = new Columns("AUV");
     this.twin = new TrackingTwin(world);
     world.calls.tracking_start(seed, policy);
     this.chip.onTrigger = (time) => (this.triggered = time);
-    this.chip.onLine = (line, time) => this.hear(line, time);
   }
 
   /** Times what the filter expects; probability; how far the vehicle swings out [m]. */
@@ -60,16 +52,8 @@ export class Tracking {
     this.world.calls.tracking_set(noise, outliers, wander);
   }
 
-  hear(line, time) {
-    this.lines.push(line);
-    const fields = fieldsOf(line);
-    if (fields === null) return;
-    if (fields[0] === "PING") {
-      this.answer(Number(fields[1]), time);
-      return;
-    }
-    const row = this.columns.read(fields);
-    if (row !== null) this.take(row);
+  react(fields, time) {
+    if (fields[0] === "PING") this.answer(Number(fields[1]), time);
   }
 
   answer(sample, time) {
