@@ -128,6 +128,27 @@ class Compass:
         return time[order], np.concatenate([velocity, filled])[order]
 
 
+def lengths_of(table: CsvTable, edges: Rows) -> Rows:
+    """Give how long increments last, s, of which each ends where the next begins.
+
+    Raises
+    ------
+    LogError
+        If two end at one time.
+    """
+    lengths = np.diff(edges)
+    if (lengths <= 0).any():
+        end = float(edges[1:][int(np.argmax(lengths <= 0))])
+        raise LogError(
+            table.path,
+            f"two increments end at {end:.10g} s",
+            line=table.line_of(end, 2),
+            column="time_s",
+            cause="times_equal",
+        )
+    return lengths
+
+
 class Motion:
     """The odometry of a log as segments, fed chunk by chunk.
 
@@ -214,16 +235,7 @@ class Motion:
             time_s, moved, turned = time_s[kept], moved[kept], turned[kept]
             self._begun = len(time_s) > 0
         edges = np.concatenate([[self.known_until], time_s])
-        dt = np.diff(edges)
-        if (dt <= 0).any():
-            time = float(time_s[int(np.argmax(dt <= 0))])
-            raise LogError(
-                self._table.path,
-                f"two increments end at {time:.10g} s",
-                line=self._table.line_of(time, 2),
-                column="time_s",
-                cause="times_equal",
-            )
+        dt = lengths_of(self._table, edges)
         turn = turned if self.steered else s.turn_factor * turned + s.turn_offset_rad_s * dt
         chord = s.speed_factor * moved
         return Segments(edges[1:], chord / dt / phi(turn), turn / dt)

@@ -24,7 +24,7 @@ from auvest.models import ConstantAcceleration
 from auvest.replay import tables
 from auvest.replay.config import FilterName, Settings
 from auvest.replay.engine import Replay
-from auvest.replay.motion import wrapped
+from auvest.replay.motion import lengths_of, wrapped
 from auvest.replay.readings import Held
 from auvest.replay.sources import Sources
 from auvest.replay.tables import Batch, Columns
@@ -146,15 +146,10 @@ class Companion(Replay):
         if self._increments:
             kept = time > self._line_s
             time, moved = time[kept], rows[kept]
-            begin = np.concatenate([[self._line_s], time])[: len(time)]
-            if (time <= begin).any():
-                end = float(time[int(np.argmax(time <= begin))])
-                raise LogError(
-                    table.path, f"two increments end at {end:.10g} s",
-                    line=table.line_of(end, 2), column="time_s", cause="times_equal",
-                )  # fmt: skip
+            edges = np.concatenate([[self._line_s], time])
+            lengths = lengths_of(table, edges)
             steps = np.column_stack([moved[:, 1], table.column(moved, "turn_rad")])
-            self._readings.add(begin, steps / (time - begin)[:, None])
+            self._readings.add(edges[:-1], steps / lengths[:, None])
             self._line_s = float(time[-1]) if len(time) else self._line_s
             return
         if self._compass:
