@@ -103,6 +103,16 @@ Data = Annotated[
         show_default=False,
     ),
 ]
+OptionalData = Annotated[
+    Path | None,
+    typer.Option(
+        "--data",
+        envvar="AUVEST_DATA",
+        file_okay=False,
+        help="Folder of the recordings.",
+        show_default="none are taken",
+    ),
+]
 Force = Annotated[
     bool,
     option(

@@ -15,7 +15,6 @@ Examples
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -40,14 +39,5 @@ command = command_of(
     figures=False,
     runs=Annotated[int, typer.Option("--runs", min=1, max=1000, help="Surveys of each error.")],
     seed=options.Seed,
-    data=Annotated[
-        Path | None,
-        typer.Option(
-            "--data",
-            envvar="AUVEST_DATA",
-            file_okay=False,
-            help="Folder of the recordings.",
-            show_default="none are replayed",
-        ),
-    ],
+    data=options.OptionalData,
 )

@@ -15,7 +15,6 @@ Examples
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -48,16 +47,7 @@ command = command_of(
         int, typer.Option("--clean", min=1, max=10_000, help="Clean trials of each kind.")
     ],
     seed=options.Seed,
-    data=Annotated[
-        Path | None,
-        typer.Option(
-            "--data",
-            envvar="AUVEST_DATA",
-            file_okay=False,
-            help="Folder of the recordings.",
-            show_default="none are checked",
-        ),
-    ],
+    data=options.OptionalData,
     workers=Annotated[
         int | None,
         typer.Option(
