@@ -44,6 +44,8 @@ MEMORY = 4096 - 16
 SLOT = BEFORE + 4 * (4 + 10) + 30 + 4
 #: A start that lives for so long has been counted [s].
 COUNTED_S = 0.1
+#: Progress is said after so many cuts.
+PROGRESS = 100
 _YEAR_S = 365.25 * 86400
 
 
@@ -178,6 +180,8 @@ def attack(
             off_s = dice.uniform(0, max(left_s, 0.0))
             left_s -= off_s
             history.now_s += life_s + off_s
+            if found.cuts % PROGRESS == 0:
+                print(f"{found.cuts} of {cuts} cuts", file=sys.stderr, flush=True)
     return found
 
 
