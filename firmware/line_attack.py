@@ -27,6 +27,8 @@ from auvest.board import Board, SerialLine
 ROOT = Path(__file__).resolve().parents[1]
 #: Answers that fit between a request and the sketch's time-out.
 PER_SAMPLE = 16
+#: Bytes that are replaced or lost at once; a line that is shorter is damaged enough.
+MOST_BYTES = 4
 
 NAMES = (
     "sample#,time_s,dt_s,range_m,bearing_rad,desired_x_m,desired_y_m,x_m,y_m,vx_m_s,vy_m_s,"
@@ -44,7 +46,7 @@ def _flip_bits(line: bytearray, dice: random.Random) -> None:
 
 
 def _replace_bytes(line: bytearray, dice: random.Random) -> None:
-    for place in dice.sample(range(len(line)), dice.randint(1, 4)):
+    for place in dice.sample(range(len(line)), dice.randint(1, MOST_BYTES)):
         line[place] = dice.randrange(256)
 
 
@@ -55,7 +57,8 @@ def _burst(line: bytearray, dice: random.Random) -> None:
 
 
 def _lose_bytes(line: bytearray, dice: random.Random) -> None:
-    for place in sorted(dice.sample(range(len(line)), dice.randint(1, 4)), reverse=True):
+    count = dice.randint(1, MOST_BYTES)
+    for place in sorted(dice.sample(range(len(line)), count), reverse=True):
         del line[place]
 
 
@@ -115,7 +118,7 @@ def damaged(line: str, other: str, dice: random.Random) -> bytes:
         if dice.random() < 0.1:
             text[:0] = other.encode("latin-1")[: dice.randrange(1, len(other))]
         for _ in range(dice.choice((1, 1, 2))):
-            if text:
+            if len(text) >= MOST_BYTES:
                 dice.choice(DAMAGES)(text, dice)
         if text and bytes(text) != whole:
             return bytes(text)

@@ -16,6 +16,15 @@ def test_no_damaged_answer_is_taken_for_another_value():
     assert counts["believed"] > 20  # those behind the rest of another line
 
 
+def test_a_line_of_any_length_can_be_damaged():
+    dice = random.Random(3)
+    for _ in range(5_000):
+        line = "".join(dice.choices("0123456789$,*AUV", k=dice.randint(4, 8)))
+        damaged = line_attack.damaged(line, line + "7", dice)
+        assert damaged
+        assert damaged != line.encode()
+
+
 def test_no_damaged_report_is_taken_for_another_value():
     counts = line_attack.attack_reports(5000, random.Random(2))
     assert counts["accepted_wrong"] == 0
