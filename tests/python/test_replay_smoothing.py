@@ -264,6 +264,16 @@ def test_the_recordings_are_smoothed_to_these(
 
 
 @needs_data
+def test_a_smoother_is_as_honest_as_the_models_it_goes_back_over(tmp_path: Path) -> None:
+    """The ranges are 6 % too long: the truth lies within three sigma once a scale is in the state."""
+    (log,) = IMPORTERS["labyrinth_uwb"](Path(str(DATA)) / "labyrinth_uwb", tmp_path)
+    settings = find_settings("labyrinth_uwb", ("constants.range_scale=0.05",))
+    numbers = replay(LogFolder(log), settings, smooth=True, causes=False).numbers
+    assert numbers["inside_3_sigma"] == numbers["smoothed"]["inside_3_sigma"] == 1
+    assert numbers["smoothed"]["rmse_m"] < numbers["rmse_m"] < 0.055
+
+
+@needs_data
 def test_a_real_log_with_a_displaced_start_is_put_right_from_there(tmp_path: Path) -> None:
     """32 m off, with a sigma of 2 m: the filter needs its recovery, the smoother knows before."""
     (log,) = IMPORTERS["goats14"](Path(str(DATA)) / "goats14", tmp_path)
