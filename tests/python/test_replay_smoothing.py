@@ -265,7 +265,7 @@ def test_the_recordings_are_smoothed_to_these(
 
 @needs_data
 def test_a_smoother_is_as_honest_as_the_models_it_goes_back_over(tmp_path: Path) -> None:
-    """The ranges are 6 % too long: the truth lies within three sigma once a scale is in the state."""
+    """The ranges are 6 % too long; with a scale in the state the truth is within three sigma."""
     (log,) = IMPORTERS["labyrinth_uwb"](Path(str(DATA)) / "labyrinth_uwb", tmp_path)
     settings = find_settings("labyrinth_uwb", ("constants.range_scale=0.05",))
     numbers = replay(LogFolder(log), settings, smooth=True, causes=False).numbers

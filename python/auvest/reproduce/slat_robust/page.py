@@ -84,8 +84,8 @@ The scenario of the SLATF paper's section 7 in configuration R1; and six hours o
 circle round nothing, with a master that stands and an echo every other second, in which nothing
 tells where the pair is. There the worst run is {hours["worst_ratio"]:.2f} times as far off as
 EKF-SLAT. Points in place of Gaussians (SLATF 2.0) lie in their ellipse in two of three pings at
-levels 3 to 7, and in a third after six hours. The gate would refuse {GATED:.0e} of the echoes if all
-were Gaussian; a share of {TWICE:.0e} of {echoes:,} has a standard error of
+levels 3 to 7, and in a third after six hours. The gate would refuse {GATED:.0e} of the echoes if
+all were Gaussian; a share of {TWICE:.0e} of {echoes:,} has a standard error of
 {math.sqrt(TWICE * (1 - TWICE) / echoes):.1e}.
 """
     header = ["level", *NAMES.values(), "ratio of RMSE", "refused, SlatfJoint"]
