@@ -119,7 +119,16 @@ AUVEST_COLD bool mend_belief(const typename Filter::State& before,
   if (subnormal) return true;
   belief.P = raised;
   raise_pivots(belief.P);
-  return Filter::check_belief(belief) == Status::kOk;
+  // Pivots behind one that is all but lost are as good as that: in another order of the same sums
+  // they may be lost yet. Then all variances grow, by the least share that serves.
+  for (Scalar share = Scalar(16) * math::machine_epsilon<Scalar>(); share < Scalar(1);
+       share = Scalar(4) * share) {
+    if (Filter::check_belief(belief) == Status::kOk) return true;
+    for (int i = 0; i < Filter::kStates; ++i) {
+      belief.P(i, i) = belief.P(i, i) + share * belief.P(i, i);
+    }
+  }
+  return false;
 }
 
 /// A Gaussian filter whose process and whose linearisation are chosen at run time.
@@ -224,43 +233,62 @@ class RuntimeRobust : public RuntimeSum<Scalar_, N> {
   using Scalar = Scalar_;
   using Base = RuntimeSum<Scalar, N>;
   using Base::Base;
+  using Base::predict;
   using Base::update;
+
+  template <class Input>
+  Status predict(Scalar dt, const Input& input) {
+    if constexpr (N > 1) {
+      if (this->size() > 1) {
+        return kept([&] { return Base::predict(dt, input); });
+      }
+    }
+    return Base::predict(dt, input);
+  }
 
   Report<Scalar> update(const Vector<Scalar, kMaxSize>& z, const PlacedSensor<Scalar, N>& sensor) {
     if constexpr (N > 1) {
-      if (this->params().components > 1) return update_sum(z, sensor);
+      if (this->params().components > 1) {
+        return kept([&] { return sensor.model->update(*this, z, sensor); });
+      }
     }
     return sensor.model->update(*this, z, sensor);
   }
 
  private:
-  /// Where the moments of the components leave the format, nothing has changed.
-  Report<Scalar> update_sum(const Vector<Scalar, kMaxSize>& z,
-                            const PlacedSensor<Scalar, N>& sensor) {
-    const auto state = this->state();
-    const auto rule = this->rule();
-    const typename Base::BeliefType belief = this->belief();
-    const Report<Scalar> report = sensor.model->update(*this, z, sensor);
-    if (report.status != Status::kOk) return report;
-    if (this->size() > 1) mend_components(belief.P.diagonal());
-    if (math::all_finite(this->belief())) return report;
-    this->restore(belief, rule, state);
-    return Report<Scalar>(Status::kOverflow);
+  static Status status_of(Status status) { return status; }
+  static Status status_of(const Report<Scalar>& report) { return report.status; }
+
+  /// What a step of several components says, which leaves what restore() takes. Where that cannot
+  /// be, as their moments leave the format, nothing has changed.
+  template <class Step>
+  std::invoke_result_t<Step> kept(const Step& step) {
+    const RuntimeRobust before = *this;
+    const std::invoke_result_t<Step> said = step();
+    if (status_of(said) != Status::kOk || mend_sum(before.belief().P.diagonal())) return said;
+    *this = before;
+    return std::invoke_result_t<Step>(Status::kOverflow);
   }
 
   /// As mend_belief() for the components, which a ring of them may have split off from a covariance
-  /// that is nearly singular.
-  void mend_components(const Vector<Scalar, N>& variances_before) {
-    bool well = true;
+  /// that is nearly singular, and for their moments, which are sums.
+  bool mend_sum(const Vector<Scalar, N>& variances_before) {
+    using Gaussian = RuntimeGaussian<Scalar, N>;
+    bool well = is_well_conditioned(this->belief().P) && math::all_finite(this->belief().x);
     for (int k = 0; k < this->size(); ++k) well = well && is_well_conditioned(this->component(k).P);
-    if (well) return;
+    if (well) return true;
     auto state = this->state();
-    for (int k = 0; k < this->size(); ++k) {
-      mend_belief<RuntimeGaussian<Scalar, N>>(variances_before, state.mixture.component[k]);
+    bool mended = false;
+    for (int k = 0; this->size() > 1 && k < this->size(); ++k) {
+      auto& component = state.mixture.component[k];
+      if (Gaussian::check_belief(component) == Status::kOk) continue;
+      mend_belief<Gaussian>(variances_before, component);
+      mended = true;
     }
-    typename Base::BeliefType whole;
-    state.mixture.moments(whole);
-    this->restore(whole, this->rule(), state);
+    typename Base::BeliefType whole = this->belief();
+    if (mended) state.mixture.moments(whole);
+    mend_belief<Gaussian>(variances_before, whole);
+    return this->restore(whole, this->rule(), state) == Status::kOk;
   }
 };
 

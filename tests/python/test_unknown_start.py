@@ -290,6 +290,36 @@ def test_components_of_a_start_that_is_nearly_singular_have_covariances(kind):
         f.restore(f.save())
 
 
+def test_moments_of_components_that_are_nearly_singular_are_a_covariance():
+    # After most of an hour position, velocity and acceleration are one number in single precision:
+    # the sum over a ring of such was refused when restored, or a prediction was as not finite.
+    singular = 0
+    for seed in range(2690, 2790):
+        rng = np.random.default_rng(seed)
+        root = rng.standard_normal((6, 6)) * np.array(
+            [[0.5], [0.3], [0.03], [0.02], [0.01], [0.02]]
+        )
+        f = auvest.Ukf(
+            rng.normal(0, 30, 6) * [1, 1, 0.05, 0.05, 0.1, 0.1],
+            root @ root.T + 1e-7 * np.eye(6),
+            process=auvest.ConstantAcceleration(
+                position_psd=0, velocity_psd=0, acceleration_psd=10 ** rng.uniform(-8, 0)
+            ),
+            sensors=auvest.LeaderRange(),
+            components=8,
+            alpha=(1e-3, 0.5, 1.0)[seed % 3],
+            dtype="float32",
+        )
+        f.predict(rng.uniform(300, 3600))
+        f.update(rng.uniform(1, 90))
+        for _ in range(4):
+            f.predict(rng.uniform(0.1, 2))
+            f.restore(f.save())
+        sigma = np.sqrt(np.diagonal(f.P).astype(float))
+        singular += np.linalg.eigvalsh(f.P / np.outer(sigma, sigma))[0] < 1e-5
+    assert singular > 50
+
+
 def test_wrong_arguments_are_refused_by_name():
     for message, options in {
         r"components must be 1, or at least 8: a ring of 5 has gaps": {"components": 5},
