@@ -210,6 +210,7 @@ bench: build-measure install-editable ## time per step beside filterpy, NumPy, N
 	    build/measure/cpp/benchmarks --write docs/speed_slat.md
 	OPENBLAS_NUM_THREADS=1 $(PY) cpp/benchmarks/vehicle_speed.py \
 	    build/measure/cpp/benchmarks --write docs/speed_vehicle.md
+	$(PY) cpp/benchmarks/many_runs.py --write docs/speed_runs.md
 	$(PY) cpp/benchmarks/startup.py --write docs/speed_startup.md
 
 math-accuracy: build-measure ## errors of the float functions over all 2^32 arguments

@@ -36,6 +36,7 @@ void bind_guidance(py::module_& m);
 void bind_mission(py::module_& m);
 void bind_pilot(py::module_& m);
 void bind_vehicle(py::module_& m);
+void bind_runs(py::module_& m);
 void bind_tracking(py::module_& m);
 void bind_slat(py::module_& m);
 void bind_self_test(py::module_& m);

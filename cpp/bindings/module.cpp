@@ -11,6 +11,7 @@ PYBIND11_MODULE(_core, m) {
   bind_kernels(m);
   bind_filters(m);
   bind_function_models(m);
+  bind_runs(m);
   bind_tracking(m);
   bind_slat(m);
   bind_cooperative(m);

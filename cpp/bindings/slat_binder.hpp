@@ -19,9 +19,6 @@
 namespace auvest {
 namespace bindings {
 
-/// Names of the instruction sets that this build and this processor have, the widest last.
-std::vector<std::string> instruction_sets(bool single_precision);
-
 AnyResampling resampling_named(const std::string& name);
 
 template <class Motion>

@@ -10,11 +10,10 @@
 #include <cstdint>
 
 #include "auvest/types.hpp"
+#include "instruction_sets.hpp"
 
 namespace auvest {
 namespace bindings {
-
-enum class InstructionSet : std::uint8_t { kScalar, kSse2, kAvx2, kAvx512 };
 
 /// Masters that a filter has room for.
 constexpr int kMostMasters = 4;

@@ -13,13 +13,6 @@
 #include "auvest/slat/slatf_joint.hpp"
 #include "auvest/slat/slatf_shared.hpp"
 
-// Particles stand in vector registers where xsimd is there to write it.
-#if defined(__x86_64__) && __has_include(<xsimd/xsimd.hpp>)
-#define AUVEST_VECTOR_LANES 1
-#else
-#define AUVEST_VECTOR_LANES 0
-#endif
-
 namespace auvest {
 inline namespace AUVEST_INSTRUCTIONS {
 

@@ -49,6 +49,23 @@ struct Record {
   const Scalar* reference = nullptr;     ///< (rows, 2) [m], NaN: the estimate; or null: no feedback
   const std::int32_t* sensor = nullptr;  ///< (rows) index into `sensors`, or null: the first
   std::vector<std::shared_ptr<const AnySensor<Scalar>>> sensors;
+
+  const std::shared_ptr<const AnySensor<Scalar>>& sensor_of(std::size_t k) const {
+    return sensors[sensor != nullptr ? static_cast<std::size_t>(sensor[k]) : 0];
+  }
+  bool measured(std::size_t k) const {
+    bool given = false;
+    for (int i = 0; i < sensor_of(k)->size; ++i) given = given || !math::is_nan(z[k * width + i]);
+    return given;
+  }
+  /// Where the sensor of a row stands; null: as the model has it.
+  const Scalar* place_of(std::size_t k) const {
+    const Scalar* there = place != nullptr ? place + k * kMaxPlace : nullptr;
+    return there != nullptr && math::is_nan(there[0]) ? nullptr : there;
+  }
+  const Scalar* input_of(std::size_t k, int inputs) const {
+    return input != nullptr ? input + k * static_cast<std::size_t>(inputs) : nullptr;
+  }
 };
 
 /// Where the results go: a column each, row by row. P and S may be null.
@@ -173,6 +190,9 @@ class RecentEvents {
 };
 
 template <class Scalar, int N>
+class SideBySide;
+
+template <class Scalar, int N>
 class FilterFor final : public AnyFilter<Scalar> {
  public:
   using Robust = RuntimeRobust<Scalar, N>;
@@ -285,13 +305,13 @@ class FilterFor final : public AnyFilter<Scalar> {
       times.push_back(now);
       Status status =
           await(AwaitedEvent(Event(record.dt[k], input), true), awaited.size(), awaited, pass);
-      const auto& sensor = sensor_of(record, k);
-      if (status == Status::kOk && measured(record, k)) {
+      const auto& sensor = record.sensor_of(k);
+      if (status == Status::kOk && record.measured(k)) {
         const Scalar age = record.age != nullptr ? record.age[k] : Scalar(0);
         int at = 0;
         const bool too_late = age > oldest() || place_of(awaited, age, at) != Status::kOk;
         const Event event(to_measurement(record.z + k * record.width, *sensor),
-                          placed(sensor, place_of_row(record, k)));
+                          placed(sensor, record.place_of(k)));
         if (!too_late) status = await(AwaitedEvent(event, false), at, awaited, pass);
       }
       if (status != Status::kOk) return status;
@@ -422,6 +442,8 @@ class FilterFor final : public AnyFilter<Scalar> {
   }
 
  private:
+  friend class SideBySide<Scalar, N>;
+
   static constexpr bool kSums = N > 1;  // one state is no position
 
   static Robust robust(const std::shared_ptr<const ProcessFor<Scalar, N>>& process,
@@ -469,21 +491,6 @@ class FilterFor final : public AnyFilter<Scalar> {
     return event.row ? pass.predict(event.dt, event.input) : event.redo(pass.filter());
   }
 
-  static const std::shared_ptr<const AnySensor<Scalar>>& sensor_of(const Record<Scalar>& record,
-                                                                   std::size_t k) {
-    return record
-        .sensors[record.sensor != nullptr ? static_cast<std::size_t>(record.sensor[k]) : 0];
-  }
-  static bool measured(const Record<Scalar>& record, std::size_t k) {
-    const Scalar* z = record.z + k * record.width;
-    bool given = false;
-    for (int i = 0; i < sensor_of(record, k)->size; ++i) given = given || !math::is_nan(z[i]);
-    return given;
-  }
-  static const Scalar* place_of_row(const Record<Scalar>& record, std::size_t k) {
-    const Scalar* place = record.place != nullptr ? record.place + k * kMaxPlace : nullptr;
-    return place != nullptr && math::is_nan(place[0]) ? nullptr : place;
-  }
   Sensor placed(const std::shared_ptr<const AnySensor<Scalar>>& sensor, const Scalar* place) const {
     const auto& model = static_cast<const SensorFor<Scalar, N>&>(*sensor);
     // Only what is remembered is owned: counting owners takes as long as a tenth of an update.
@@ -502,14 +509,12 @@ class FilterFor final : public AnyFilter<Scalar> {
   }
 
   Status take(const Record<Scalar>& record, std::size_t k, Report<Scalar>& report, bool& too_late) {
-    const Scalar* input = record.input;
-    if (input != nullptr) input += k * static_cast<std::size_t>(inputs());
-    Status status = predict(record.dt[k], input);
+    Status status = predict(record.dt[k], record.input_of(k, inputs()));
     if (status != Status::kOk) return status;
-    if (measured(record, k)) {
+    if (record.measured(k)) {
       const Scalar age = record.age != nullptr ? record.age[k] : Scalar(0);
       const Scalar* z = record.z + k * record.width;
-      report = update(z, sensor_of(record, k), place_of_row(record, k), age);
+      report = update(z, record.sensor_of(k), record.place_of(k), age);
       too_late = report.status == Status::kTimeBackwards && age > Scalar(0);
       if (too_late) report = Report<Scalar>();
       if (report.status != Status::kOk) return report.status;

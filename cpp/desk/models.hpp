@@ -246,6 +246,12 @@ class RuntimeRobust : public RuntimeSum<Scalar_, N> {
     return Base::predict(dt, input);
   }
 
+  /// The belief and the recovery of a run that has gone on elsewhere.
+  void put(const typename Base::BeliefType& belief, const RejectionStreak<Scalar>& streak) {
+    this->belief_in_place() = belief;
+    this->rule_in_place().recovery.streak = streak;
+  }
+
   Report<Scalar> update(const Vector<Scalar, kMaxSize>& z, const PlacedSensor<Scalar, N>& sensor) {
     if constexpr (N > 1) {
       if (this->params().components > 1) {

@@ -53,6 +53,7 @@ PAGES = {
         "boards",
         "budgets",
         "speed",
+        "speed_runs",
         "speed_slat",
         "speed_vehicle",
         "speed_startup",

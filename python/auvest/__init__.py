@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from auvest.filters import RobustEkf as RobustEkf
     from auvest.filters import RobustUkf as RobustUkf
     from auvest.filters import RunResult as RunResult
+    from auvest.filters import RunsResult as RunsResult
     from auvest.filters import SmoothResult as SmoothResult
     from auvest.filters import Ukf as Ukf
     from auvest.filters.ckf import Ckf as Ckf
@@ -128,6 +129,7 @@ else:
         "RobustEkf": "filters",
         "RobustUkf": "filters",
         "RunResult": "filters",
+        "RunsResult": "filters",
         "SmoothResult": "filters",
         "SelfTestPart": "_core",
         "SelfTestResult": "_core",

@@ -238,6 +238,14 @@ class _Filter(Generic[_Array], metaclass=_Type):
 class Filter_float32(_Filter[_F32]): ...
 class Filter_float64(_Filter[_F64]): ...
 
+def run_each(
+    filter: _Filter[_Array],  # noqa: A002
+    record: Mapping[str, Any],
+    sensors: list[_Sensor[_Array]],
+    columns: Mapping[str, Any],
+    lanes: str,
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], npt.NDArray[np.uint8]]: ...
+
 # intervals/
 
 class _Interval(metaclass=_Type):

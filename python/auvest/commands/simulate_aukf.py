@@ -235,7 +235,7 @@ def measures(result: TrackingResult) -> dict[str, Any]:
     nis = result.nis[np.isfinite(result.nis)]
     nis_bounds = metrics.chi2_bounds(2, nis.size) if nis.size else (np.nan, np.nan)
     nees = result.nees
-    nees_per_step = np.array([_mean(nees[:, k]) for k in range(nees.shape[1])])
+    nees_per_step = _mean_per_step(nees)
     nees_bounds = metrics.chi2_bounds(2, int(seen.sum())) if seen.any() else (np.nan, np.nan)
     inside = (nees_per_step >= nees_bounds[0]) & (nees_per_step <= nees_bounds[1])
     interval = result.mean_interval_s
@@ -272,7 +272,7 @@ def means_per_step(result: TrackingResult) -> dict[str, Floats]:
     }
     table = {"step": np.arange(1.0, led.shape[1] + 1)}
     for name, values in columns.items():
-        mean = np.array([_mean(values[:, k]) for k in range(values.shape[1])])
+        mean = _mean_per_step(values)
         table[name] = np.sqrt(mean) if name.startswith("rms") else mean
     return table
 
@@ -300,6 +300,10 @@ def one_run(result: TrackingResult, sensor: RangeBearing, run: int = 0) -> dict[
     return columns
 
 
+def _mean_per_step(values: Floats) -> Floats:
+    return np.array([_mean(values[:, k]) for k in range(values.shape[1])])
+
+
 def _mean(values: Floats) -> float:
     known = values[np.isfinite(values)]
     return float(known.mean()) if known.size else float("nan")
@@ -313,7 +317,7 @@ def _figure(
     colour = plots.FILTER_COLOURS[name]
     led = np.diff(result.time_s, axis=1, prepend=0.0)
     known = np.where(np.isfinite(led), led, np.nan)
-    mean = means_per_step(result)["interval_s"]
+    mean = _mean_per_step(led)
     complete = known[np.isfinite(known).all(axis=1)]
     low, high = (np.quantile(complete, q, axis=0) if len(complete) else None for q in (0.05, 0.95))
     pace = [plots.Line("mean, 5 to 95 %", mean, low=low, high=high, colour=colour)]

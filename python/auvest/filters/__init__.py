@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from auvest.filters._base import GaussianFilter, Residual, Sensors
 from auvest.filters.ekf import Ekf, RobustEkf
-from auvest.filters.results import Mixture, Report, RunResult, SmoothResult
+from auvest.filters.results import Mixture, Report, RunResult, RunsResult, SmoothResult
 from auvest.filters.ukf import Aukf, RobustUkf, Ukf
 
 __all__ = [
@@ -17,6 +17,7 @@ __all__ = [
     "RobustEkf",
     "RobustUkf",
     "RunResult",
+    "RunsResult",
     "Sensors",
     "SmoothResult",
     "Ukf",

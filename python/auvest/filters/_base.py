@@ -30,6 +30,7 @@ from auvest._arguments import (
     as_real,
     as_step,
     as_steps,
+    as_workers,
     far_from_origin,
     impossible_range,
     require_range,
@@ -38,6 +39,7 @@ from auvest._core import Convergence, Decision, Status
 from auvest._interrupts import first_slice, in_slices
 from auvest._state import describe, pack, require, unpack
 from auvest.errors import FilterError, Interrupted
+from auvest.filters._many import is_stack, run_many
 from auvest.filters.results import Mixture, Report, RunResult, SmoothResult
 from auvest.intervals import FixedInterval, IntervalPolicy, MahalanobisInterval, core_interval
 from auvest.kernels import Kernel, KernelName, RejectionStreak, Unit, as_kernel, core_kernel
@@ -513,12 +515,20 @@ class GaussianFilter:
         age_s: npt.ArrayLike | None = None,
         reference: npt.ArrayLike | None = None,
         covariance: bool = True,
+        workers: int | None = None,
     ) -> RunResult:
-        """Predict and update over a record, in C++ and without the GIL.
+        """Predict and update over a record, in C++ and without the GIL; or over many records.
+
+        Of an array of three axes each ``z[r]`` is a record, and a run of its own: it begins where
+        the filter is, and the filter stays there. ``dt``, ``input``, ``place``, ``age_s`` and
+        ``reference`` are those of all runs, or have an axis for the runs in front. The runs are
+        done on all processors and, where the models are among those that stand in vector lanes,
+        several at a time in each; the bits are those of each record by itself. No run is refused
+        for another's sake: see :class:`RunsResult`.
 
         Parameters
         ----------
-        z : array_like, shape (T, m); (T,) where all measurements are one number
+        z : array_like, shape (T, m) or (runs, T, m); (T,) where all measurements are one number
             A measurement per row, those of smaller sensors filled up with NaN. NaN throughout: the
             measurement is missing and that row only predicts.
         dt : float or array_like, shape (T,)
@@ -541,25 +551,32 @@ class GaussianFilter:
             Desired positions, m, for the policy; default: the estimates themselves.
         covariance : bool
             Whether ``P`` and ``S`` are recorded.
+        workers : int, optional
+            Threads for many records, 1 to 256; default: one per processor. Nothing depends on it.
 
         Returns
         -------
         RunResult
+            Of many records a :class:`RunsResult`.
 
         Raises
         ------
         ValueError, TypeError
             If an argument is wrong; the filter is unchanged.
         FilterError
-            If a row cannot be done: ``dt`` beyond ``longest_step_s``, a range that the sensor
-            cannot measure, a place far from the origin, numbers that overflow. ``step`` names it,
-            ``partial`` holds the results before it, and the filter stays at the row before; a
-            further ``run`` may go on behind the row.
+            If a row of a single record cannot be done: ``dt`` beyond ``longest_step_s``, a range
+            that the sensor cannot measure, a place far from the origin, numbers that overflow.
+            ``step`` names it, ``partial`` holds the results before it, and the filter stays at the
+            row before; a further ``run`` may go on behind the row.
         Interrupted
             After Ctrl-C, a ``KeyboardInterrupt`` within half a second: ``partial`` holds the
-            results so far, and the filter stays at their last row.
+            results so far, and the filter stays at their last row; of many records the runs done.
         """
         as_flag("covariance", covariance)
+        threads = as_workers(workers)
+        if is_stack(z):
+            arguments = (dt, input, sensor, place, age_s, reference)
+            return run_many(self, z, *arguments, covariance=covariance, workers=threads)
         record, handles = self._as_record(z, dt, input, sensor, place, age_s, reference)
         count = len(record["z"])
         before = self._before_functions()
@@ -747,6 +764,20 @@ class GaussianFilter:
     ) -> tuple[dict[str, Any], list[Any]]:
         """Take the arguments of :meth:`run`: columns for the core, and its sensors."""
         handles, which = self._as_sensor_rows(sensor)
+        return self._as_columns(z, dt, input, handles, which, place, age_s, reference), handles
+
+    def _as_columns(
+        self,
+        z: npt.ArrayLike,
+        dt: npt.ArrayLike | None,
+        input: npt.ArrayLike | None,
+        handles: list[Any],
+        which: npt.NDArray[np.int32] | None,
+        place: npt.ArrayLike | None,
+        age_s: npt.ArrayLike | None,
+        reference: npt.ArrayLike | None,
+    ) -> dict[str, Any]:
+        """Take those of them that have a row per measurement of these sensors."""
         rows = self._as_measurements(z, handles, which)
         count = len(rows)
         if which is not None and len(which) != count:
@@ -761,7 +792,7 @@ class GaussianFilter:
                 _require_rows("reference", track, count)
         elif reference is not None:
             raise TypeError("reference must be None: this filter has no interval policy")
-        record: dict[str, Any] = {
+        return {
             "z": rows,
             "dt": np.full(count, np.nan, self._dtype)
             if dt is None
@@ -772,7 +803,6 @@ class GaussianFilter:
             "reference": track,
             "sensor": which,
         }
-        return record, handles
 
     @property
     def _slow(self) -> bool:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from auvest._arguments import Floats
-from auvest._core import Decision
+from auvest._core import Decision, Status
 from auvest.results import Result
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True)
@@ -129,6 +134,50 @@ class RunResult(Result):
     too_late: npt.NDArray[np.bool_]
     convergence: npt.NDArray[np.uint8]
     mixture_size: npt.NDArray[np.uint8]
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class RunsResult(RunResult):
+    """What ``run`` returns for many records: the columns of each run, and how it ended.
+
+    The columns are those of :class:`RunResult` with an axis for the runs in front: ``x`` is of
+    shape (runs, T, n). A run ends before the first row that is refused. From there on its floats
+    are NaN and its other columns 0; ``rows`` and ``status`` say so, and no other run is touched.
+
+    Attributes
+    ----------
+    rows : ndarray of int, shape (runs,)
+        Rows that were done.
+    status : ndarray of uint8, shape (runs,)
+        How each run ended: values of :class:`auvest.Status`, 0 is ok.
+    """
+
+    rows: npt.NDArray[np.int64]
+    status: npt.NDArray[np.uint8]
+
+    @property
+    def failed(self) -> npt.NDArray[np.bool_]:
+        """Runs with a row that was refused, shape (runs,)."""
+        return self.status != int(Status.ok)
+
+    def run(self, number: int) -> RunResult:
+        """Give the result of one run: the rows that it has done."""
+        ends = ("rows", "status")
+        done = int(self.rows[number])
+        columns = {name: self[name][number][:done] for name in self.columns if name not in ends}
+        absent = {field.name: None for field in fields(RunResult) if field.name not in columns}
+        return RunResult(**columns, **absent)  # type: ignore[arg-type]
+
+    def to_pandas(self, columns: Iterable[str] | None = None) -> pd.DataFrame:
+        """Make a pandas DataFrame of all runs, whose index is (run, row).
+
+        See :meth:`RunResult.to_pandas`; ``rows`` and ``status`` are not in it.
+        """
+        names = None if columns is None else list(columns)
+        frames = {r: self.run(r).to_pandas(names) for r in range(len(self))}
+        import pandas as pd
+
+        return pd.concat(frames, names=["run", "row"])
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import astuple, dataclass
-from functools import partial
+from functools import cached_property, partial
 from math import inf
 from typing import Any, Literal
 
@@ -233,7 +233,7 @@ class TrackingResult(Runs):
         """Position errors at the samples, m, shape (runs, steps, 2)."""
         return self.x[..., :2] - self.truth
 
-    @property
+    @cached_property
     def nees(self) -> npt.NDArray[np.float64]:
         """Normalised position error squared, shape (runs, steps); 2 degrees of freedom."""
         return metrics.nees(self.error, self.position_covariance)

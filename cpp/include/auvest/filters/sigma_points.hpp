@@ -64,19 +64,19 @@ struct SigmaPoints {
   /// The transform about `point`, whose deviations depend on the first O states, with the root L of
   /// their covariance. In: the additive noise covariance (lower triangle) in
   /// `e`. Out: the columns t_i of `t`, the shift m of the mean, and e + sum s_i s_i' + (beta -
-  /// alpha^2) m m', so that P_yy = t t' + e and P_oy = L t'.
-  template <class Point, int O, int M>
-  AUVEST_INLINE void transform(const Point& point, const Matrix<Scalar, O, O>& root,
-                               Matrix<Scalar, M, O>& t, Vector<Scalar, M>& shift,
-                               Matrix<Scalar, M, M>& e) const {
-    Matrix<Scalar, M, O + 1> s;  // the s_i and, last, the term of the mean
+  /// alpha^2) m m', so that P_yy = t t' + e and P_oy = L t'. Value: Scalar, or a batch of such.
+  template <class Point, class Value, int O, int M>
+  AUVEST_INLINE void transform(const Point& point, const Matrix<Value, O, O>& root,
+                               Matrix<Value, M, O>& t, Vector<Value, M>& shift,
+                               Matrix<Value, M, M>& e) const {
+    Matrix<Value, M, O + 1> s;  // the s_i and, last, the term of the mean
     AUVEST_UNROLL
     for (int k = 0; k < O; ++k) {
-      Vector<Scalar, O> step;
+      Vector<Value, O> step;
       AUVEST_UNROLL
       for (int i = 0; i < O; ++i) step(i) = sqrt_c * root(i, k);
-      Vector<Scalar, M> sum;
-      Vector<Scalar, M> difference;
+      Vector<Value, M> sum;
+      Vector<Value, M> difference;
       point.deviations(step, sum, difference);
       AUVEST_UNROLL
       for (int m = 0; m < M; ++m) {
@@ -87,7 +87,7 @@ struct SigmaPoints {
     }
     AUVEST_UNROLL
     for (int m = 0; m < M; ++m) {
-      Scalar total = s(m, 0);
+      Value total = s(m, 0);
       AUVEST_UNROLL
       for (int k = 1; k < O; ++k) total = total + s(m, k);
       shift(m) = mean_weight * total;  // [UKF D1]

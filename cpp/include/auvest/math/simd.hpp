@@ -1,4 +1,4 @@
-// The functions of this folder on batches of floats (xsimd), lane by lane the bits of the scalar
+// The functions of this folder on batches of numbers (xsimd), lane by lane the bits of the scalar
 // ones. Host only.
 //
 // Polynomials and reductions are the scalar code's own templates. What is rare there (infinities,
@@ -7,6 +7,7 @@
 
 #include <cfloat>
 #include <cstdint>
+#include <type_traits>
 #include <xsimd/xsimd.hpp>
 
 #include "auvest/math/angle.hpp"
@@ -50,69 +51,85 @@ struct WordBatch {
   }
 };
 
-/// One float per lane.
-template <class Arch>
-struct FloatBatch {
-  using Batch = xsimd::batch<float, Arch>;
-  using Mask = xsimd::batch_bool<float, Arch>;
+/// One number per lane: FloatBatch and DoubleBatch.
+template <class Number_, class Arch>
+struct NumberBatch {
+  using Number = Number_;
+  using Batch = xsimd::batch<Number, Arch>;
+  using Mask = xsimd::batch_bool<Number, Arch>;
   static constexpr int kWidth = static_cast<int>(Batch::size);
   Batch v;
 
-  FloatBatch() = default;
-  AUVEST_INLINE FloatBatch(float x) : v(x) {}  // implicit: a number is the same in all lanes
-  explicit AUVEST_INLINE FloatBatch(double x) : v(static_cast<float>(x)) {}
-  explicit AUVEST_INLINE FloatBatch(int x) : v(static_cast<float>(x)) {}
-  explicit AUVEST_INLINE FloatBatch(const Batch& x) : v(x) {}
+  NumberBatch() = default;
+  AUVEST_INLINE NumberBatch(Number x) : v(x) {}  // implicit: a number is the same in all lanes
+  /// Of another type of number.
+  template <class Other, class = typename std::enable_if<std::is_arithmetic<Other>::value &&
+                                                         !std::is_same<Other, Number>::value>::type>
+  explicit AUVEST_INLINE NumberBatch(Other x) : v(static_cast<Number>(x)) {}
+  explicit AUVEST_INLINE NumberBatch(const Batch& x) : v(x) {}
 
-  friend AUVEST_INLINE FloatBatch operator+(const FloatBatch& a, const FloatBatch& b) {
-    return FloatBatch(Batch(a.v + b.v));
+  friend AUVEST_INLINE NumberBatch operator+(const NumberBatch& a, const NumberBatch& b) {
+    return NumberBatch(Batch(a.v + b.v));
   }
-  friend AUVEST_INLINE FloatBatch operator-(const FloatBatch& a, const FloatBatch& b) {
-    return FloatBatch(Batch(a.v - b.v));
+  friend AUVEST_INLINE NumberBatch operator-(const NumberBatch& a, const NumberBatch& b) {
+    return NumberBatch(Batch(a.v - b.v));
   }
-  friend AUVEST_INLINE FloatBatch operator*(const FloatBatch& a, const FloatBatch& b) {
-    return FloatBatch(Batch(a.v * b.v));
+  friend AUVEST_INLINE NumberBatch operator*(const NumberBatch& a, const NumberBatch& b) {
+    return NumberBatch(Batch(a.v * b.v));
   }
-  friend AUVEST_INLINE FloatBatch operator/(const FloatBatch& a, const FloatBatch& b) {
-    return FloatBatch(Batch(a.v / b.v));
+  friend AUVEST_INLINE NumberBatch operator/(const NumberBatch& a, const NumberBatch& b) {
+    return NumberBatch(Batch(a.v / b.v));
   }
   /// With the sign of zero, as a number's. (xsimd's, for AVX-512, is 0 - v.)
-  AUVEST_INLINE FloatBatch operator-() const { return FloatBatch(Batch(v ^ Batch(-0.0f))); }
-  friend AUVEST_INLINE Mask operator<(const FloatBatch& a, const FloatBatch& b) {
+  AUVEST_INLINE NumberBatch operator-() const { return NumberBatch(Batch(v ^ Batch(-Number(0)))); }
+  friend AUVEST_INLINE Mask operator<(const NumberBatch& a, const NumberBatch& b) {
     return a.v < b.v;
   }
-  friend AUVEST_INLINE Mask operator>(const FloatBatch& a, const FloatBatch& b) {
+  friend AUVEST_INLINE Mask operator>(const NumberBatch& a, const NumberBatch& b) {
     return a.v > b.v;
   }
-  friend AUVEST_INLINE Mask operator<=(const FloatBatch& a, const FloatBatch& b) {
+  friend AUVEST_INLINE Mask operator<=(const NumberBatch& a, const NumberBatch& b) {
     return a.v <= b.v;
   }
-  friend AUVEST_INLINE Mask operator>=(const FloatBatch& a, const FloatBatch& b) {
+  friend AUVEST_INLINE Mask operator>=(const NumberBatch& a, const NumberBatch& b) {
     return a.v >= b.v;
   }
 };
 
 template <class Arch>
-struct ScalarOf<FloatBatch<Arch>> {
-  using Type = float;
+using FloatBatch = NumberBatch<float, Arch>;
+template <class Arch>
+using DoubleBatch = NumberBatch<double, Arch>;
+
+template <class Number, class Arch>
+struct ScalarOf<NumberBatch<Number, Arch>> {
+  using Type = Number;
 };
 
-template <class Arch>
-AUVEST_INLINE FloatBatch<Arch> select(const xsimd::batch_bool<float, Arch>& condition,
-                                      const FloatBatch<Arch>& yes, const FloatBatch<Arch>& no) {
-  return FloatBatch<Arch>(xsimd::select(condition, yes.v, no.v));
+template <class Number, class Arch>
+AUVEST_INLINE NumberBatch<Number, Arch> select(const xsimd::batch_bool<Number, Arch>& condition,
+                                               const NumberBatch<Number, Arch>& yes,
+                                               const NumberBatch<Number, Arch>& no) {
+  return NumberBatch<Number, Arch>(xsimd::select(condition, yes.v, no.v));
 }
 
 /// One instruction; a NaN gives what the general larger() gives.
-template <class Arch>
-AUVEST_INLINE FloatBatch<Arch> larger(const FloatBatch<Arch>& a, const FloatBatch<Arch>& b) {
-  return FloatBatch<Arch>(xsimd::max(b.v, a.v));
+template <class Number, class Arch>
+AUVEST_INLINE NumberBatch<Number, Arch> larger(const NumberBatch<Number, Arch>& a,
+                                               const NumberBatch<Number, Arch>& b) {
+  return NumberBatch<Number, Arch>(xsimd::max(b.v, a.v));
 }
 
 /// `b` where b < a, `a` elsewhere; so `a` where one of them is NaN.
-template <class Arch>
-AUVEST_INLINE FloatBatch<Arch> smaller(const FloatBatch<Arch>& a, const FloatBatch<Arch>& b) {
-  return FloatBatch<Arch>(xsimd::min(b.v, a.v));
+template <class Number, class Arch>
+AUVEST_INLINE NumberBatch<Number, Arch> smaller(const NumberBatch<Number, Arch>& a,
+                                                const NumberBatch<Number, Arch>& b) {
+  return NumberBatch<Number, Arch>(xsimd::min(b.v, a.v));
+}
+
+template <class Number, class Arch>
+AUVEST_INLINE NumberBatch<Number, Arch> sqrt(const NumberBatch<Number, Arch>& x) {
+  return NumberBatch<Number, Arch>(xsimd::sqrt(x.v));
 }
 
 template <class Arch>
@@ -143,32 +160,30 @@ AUVEST_INLINE WordBatch<Arch> rotate_left(const WordBatch<Arch>& x, int count) {
   return (x << count) | (x >> (32 - count));
 }
 
-template <class Arch>
-AUVEST_INLINE FloatBatch<Arch> sqrt(const FloatBatch<Arch>& x) {
-  return FloatBatch<Arch>(xsimd::sqrt(x.v));
-}
-
 // From here on a Value is a FloatBatch or a Twin.
 
 namespace detail {
 
 /// The scalar function of each lane, or of each pair of lanes.
-template <class Arch, class Function>
-AUVEST_COLD FloatBatch<Arch> lane_by_lane(const FloatBatch<Arch>& x, Function function) {
-  alignas(64) float lanes[FloatBatch<Arch>::kWidth];
+template <class Number, class Arch, class Function>
+AUVEST_COLD NumberBatch<Number, Arch> lane_by_lane(const NumberBatch<Number, Arch>& x,
+                                                   Function function) {
+  alignas(64) Number lanes[NumberBatch<Number, Arch>::kWidth];
   x.v.store_aligned(lanes);
-  for (float& lane : lanes) lane = function(lane);
-  return FloatBatch<Arch>(xsimd::batch<float, Arch>::load_aligned(lanes));
+  for (Number& lane : lanes) lane = function(lane);
+  return NumberBatch<Number, Arch>(xsimd::batch<Number, Arch>::load_aligned(lanes));
 }
-template <class Arch, class Function>
-AUVEST_COLD FloatBatch<Arch> lane_by_lane(const FloatBatch<Arch>& x, const FloatBatch<Arch>& y,
-                                          Function function) {
-  alignas(64) float lanes_x[FloatBatch<Arch>::kWidth];
-  alignas(64) float lanes_y[FloatBatch<Arch>::kWidth];
+template <class Number, class Arch, class Function>
+AUVEST_COLD NumberBatch<Number, Arch> lane_by_lane(const NumberBatch<Number, Arch>& x,
+                                                   const NumberBatch<Number, Arch>& y,
+                                                   Function function) {
+  using Value = NumberBatch<Number, Arch>;
+  alignas(64) Number lanes_x[Value::kWidth];
+  alignas(64) Number lanes_y[Value::kWidth];
   x.v.store_aligned(lanes_x);
   y.v.store_aligned(lanes_y);
-  for (int i = 0; i < FloatBatch<Arch>::kWidth; ++i) lanes_x[i] = function(lanes_x[i], lanes_y[i]);
-  return FloatBatch<Arch>(xsimd::batch<float, Arch>::load_aligned(lanes_x));
+  for (int i = 0; i < Value::kWidth; ++i) lanes_x[i] = function(lanes_x[i], lanes_y[i]);
+  return Value(xsimd::batch<Number, Arch>::load_aligned(lanes_x));
 }
 template <class Batch, class Function>
 AUVEST_INLINE Twin<Batch> lane_by_lane(const Twin<Batch>& x, Function function) {
@@ -310,6 +325,50 @@ AUVEST_INLINE Value wrap(const Value& a) {
   const Value signed_turn = select(a < Value(0.0f), -turned, turned);
   const Value outside = select(size > Value(pi<float>()), signed_turn, size);  // -pi: +pi
   return select(inside, a, outside);
+}
+
+// Doubles: what is not in the processor goes lane by lane through the scalar function.
+
+template <class Arch>
+AUVEST_INLINE DoubleBatch<Arch> absolute(const DoubleBatch<Arch>& x) {
+  return DoubleBatch<Arch>(xsimd::abs(x.v));
+}
+template <class Arch>
+AUVEST_INLINE Mask<DoubleBatch<Arch>> is_finite(const DoubleBatch<Arch>& x) {
+  return absolute(x) <= DoubleBatch<Arch>(DBL_MAX);
+}
+template <class Arch>
+AUVEST_INLINE void sincos_near(const DoubleBatch<Arch>& x, DoubleBatch<Arch>& s,
+                               DoubleBatch<Arch>& c) {
+  constexpr int kWidth = DoubleBatch<Arch>::kWidth;
+  alignas(64) double angles[kWidth];
+  alignas(64) double sines[kWidth];
+  alignas(64) double cosines[kWidth];
+  x.v.store_aligned(angles);
+  for (int i = 0; i < kWidth; ++i) {
+    if (i > 0 && angles[i] == angles[i - 1] && angles[i] != 0.0) {  // often all are alike
+      sines[i] = sines[i - 1];
+      cosines[i] = cosines[i - 1];
+    } else {
+      math::sincos(angles[i], sines[i], cosines[i]);
+    }
+  }
+  s = DoubleBatch<Arch>(xsimd::batch<double, Arch>::load_aligned(sines));
+  c = DoubleBatch<Arch>(xsimd::batch<double, Arch>::load_aligned(cosines));
+}
+template <class Arch>
+AUVEST_INLINE void sincos(const DoubleBatch<Arch>& x, DoubleBatch<Arch>& s, DoubleBatch<Arch>& c) {
+  sincos_near(x, s, c);
+}
+template <class Arch>
+AUVEST_INLINE DoubleBatch<Arch> atan2(const DoubleBatch<Arch>& y, const DoubleBatch<Arch>& x) {
+  return detail::lane_by_lane(y, x, [](double a, double b) { return math::atan2(a, b); });
+}
+template <class Arch>
+AUVEST_INLINE DoubleBatch<Arch> wrap(const DoubleBatch<Arch>& a) {
+  using Value = DoubleBatch<Arch>;
+  if (all(a > Value(-pi<double>()) && a <= Value(pi<double>()))) return a;
+  return detail::lane_by_lane(a, [](double lane) { return math::wrap(lane); });
 }
 
 }  // namespace math

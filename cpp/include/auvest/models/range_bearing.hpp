@@ -216,7 +216,7 @@ struct RangeBearing : MeasurementModel<RangeBearing<Scalar_, N>, Scalar_, N, 2, 
     return far ? Status::kFarFromOrigin : Status::kOk;
   }
 
- private:
+ protected:
   AUVEST_INLINE void as_position(const Expansion& point, const Measurement& z,
                                  Measurement& innovation, Noise& noise) const {
     Scalar sine, cosine;

@@ -1,0 +1,23 @@
+// Runs of filters side by side, 4 floats or 2 doubles in each register of SSE2.
+#if defined(__x86_64__) && __has_include(<xsimd/xsimd.hpp>)
+
+#include "desk/lane_steps.hpp"
+#include "run_lanes.hpp"
+
+namespace auvest {
+namespace bindings {
+
+template <>
+desk::LaneSteps<float> run_lanes<InstructionSet::kSse2>() {
+  return lane_steps<xsimd::sse2, float>();
+}
+
+template <>
+desk::LaneSteps<double> run_lanes<InstructionSet::kSse2>() {
+  return lane_steps<xsimd::sse2, double>();
+}
+
+}  // namespace bindings
+}  // namespace auvest
+
+#endif
