@@ -233,7 +233,6 @@ class RuntimeRobust : public RuntimeSum<Scalar_, N> {
   using Scalar = Scalar_;
   using Base = RuntimeSum<Scalar, N>;
   using Base::Base;
-  using Base::predict;
   using Base::update;
 
   template <class Input>

@@ -11,7 +11,8 @@ namespace desk {
 
 /// Whether all pivots of P are well above the noise of their elimination: then check_belief() need
 /// not be asked. Without a division, on which each next pivot would wait, the pivots and what they
-/// are compared with grow by a common factor; false, too, where that leaves the format.
+/// are compared with grow by a common factor; false, too, where that leaves the format, or where
+/// the inverse of a pivot might.
 template <class Scalar, int N>
 __attribute__((noinline)) bool is_well_conditioned(const Matrix<Scalar, N, N>& P) {
   using Limits = std::numeric_limits<double>;
@@ -24,11 +25,13 @@ __attribute__((noinline)) bool is_well_conditioned(const Matrix<Scalar, N, N>& P
   }
   bool well = true;
   double noise = 16 * static_cast<double>(math::pivot_floor(Scalar(1)));  // times the factor
+  const double normal = static_cast<double>((std::numeric_limits<Scalar>::min)()) / noise;
   AUVEST_UNROLL
   for (int k = 0; k < N; ++k) {
     const double pivot = c[k][k];
     const double least = noise * static_cast<double>(p[k * N + k]);
-    well = well && least >= (Limits::min)() && pivot > least && pivot <= (Limits::max)();
+    well = well && static_cast<double>(p[k * N + k]) >= normal && least >= (Limits::min)() &&
+           pivot > least && pivot <= (Limits::max)();
     noise = noise * pivot;
     AUVEST_UNROLL
     for (int i = k + 1; i < N; ++i) {
