@@ -101,3 +101,17 @@ TEST_CASE("what is not finite is not well conditioned, wherever it stands") {
     }
   }
 }
+
+TEST_CASE("a variance whose pivot may have no inverse in the format is not well conditioned") {
+  for (double variance : {1e-30, 1.6e-33, 1.4e-33, 1e-38, 1.6e-43}) {
+    const double d[3] = {1e-4, variance, 1e-6};
+    Matrix<float, 3, 3> p = Matrix<float, 3, 3>::Zero();
+    for (int i = 0; i < 3; ++i) p(i, i) = static_cast<float>(d[i]);
+    CAPTURE(variance);
+    // The smallest pivot that is asked for is 64 epsilon of it.
+    const double least = std::numeric_limits<float>::min();
+    const double noise = 64 * static_cast<double>(std::numeric_limits<float>::epsilon());
+    CHECK(is_well_conditioned(p) == (variance * noise > least));
+    if (is_well_conditioned(p)) CHECK(auvest::math::is_positive_definite(p));
+  }
+}
