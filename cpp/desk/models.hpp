@@ -235,14 +235,15 @@ class RuntimeRobust : public RuntimeSum<Scalar_, N> {
   using Base::Base;
   using Base::update;
 
-  template <class Input>
-  Status predict(Scalar dt, const Input& input) {
+  /// With the process's input, where there is one.
+  template <class... Input>
+  Status predict(Scalar dt, const Input&... input) {
     if constexpr (N > 1) {
       if (this->size() > 1) {
-        return kept([&] { return Base::predict(dt, input); });
+        return kept([&] { return Base::predict(dt, input...); });
       }
     }
-    return Base::predict(dt, input);
+    return Base::predict(dt, input...);
   }
 
   /// The belief and the recovery of a run that has gone on elsewhere.
