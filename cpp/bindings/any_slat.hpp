@@ -1,5 +1,6 @@
 // A filter of slat/ chosen at run time, for Python: Slatf, SlatfJoint, EkfSlat or DeadReckoning
-// behind one interface, so that records, scenarios and outages are compiled once per pose.
+// behind one interface, so that records, scenarios and outages are compiled once per pose, and
+// those of an outage's filter not again.
 #pragma once
 
 #include <cstring>
@@ -20,8 +21,9 @@
 namespace auvest {
 inline namespace AUVEST_INSTRUCTIONS {
 
+/// What a filter and its outage switch have in common.
 template <class Scalar_, int Pose>
-class AnySlat {
+class SlatSteps {
  public:
   using Scalar = Scalar_;
   static constexpr int kPose = Pose;
@@ -30,11 +32,36 @@ class AnySlat {
   using SlaveBelief = Belief<Scalar, Pose>;
   using MasterBelief = Belief<Scalar, 6>;
   using VelocityChange = Vector<Scalar, 2>;
+
+  virtual ~SlatSteps() = default;
+  virtual Status predict(Scalar dt, const Control& u, math::Random& random,
+                         const VelocityChange* changes) = 0;
+  virtual Status update(const Echo<Scalar>* echoes, int count, const Sonar<Scalar>& sonar,
+                        math::Random& random) = 0;
+  virtual SlaveBelief slave() const = 0;
+  virtual MasterBelief master(int n) const = 0;
+  virtual int masters() const = 0;
+  virtual bindings::SlatReadings<Scalar> readings() const = 0;
+  virtual void save(bindings::SlatState<Scalar>& state) const = 0;
+  /// False, and as before, where it is not the state of such a filter.
+  virtual bool restore(const bindings::SlatStateView<Scalar>& state) = 0;
+};
+
+template <class Scalar_, int Pose>
+class AnySlat final : public SlatSteps<Scalar_, Pose> {
+ public:
+  using Scalar = Scalar_;
+  using Steps = SlatSteps<Scalar, Pose>;
+  using Steps::kMasters;
+  using typename Steps::Control;
+  using typename Steps::MasterBelief;
+  using typename Steps::SlaveBelief;
+  using typename Steps::VelocityChange;
   using Interface = bindings::SlatInterface<Scalar, Pose>;
 
   /// Takes over what was made.
   explicit AnySlat(Interface* filter) : filter_(filter) {}
-  AnySlat(const AnySlat& other) : filter_(other.filter_->clone()) {}
+  AnySlat(const AnySlat& other) : Steps(other), filter_(other.filter_->clone()) {}
   AnySlat(AnySlat&&) = default;
   AnySlat& operator=(AnySlat&&) = default;
 
@@ -45,11 +72,11 @@ class AnySlat {
     return Status(filter_->add_master(belief.x, belief.P));
   }
   Status predict(Scalar dt, const Control& u, math::Random& random,
-                 const VelocityChange* changes = nullptr) {
+                 const VelocityChange* changes = nullptr) override {
     return Status(filter_->predict(dt, u, changes, &random));
   }
   Status update(const Echo<Scalar>* echoes, int count, const Sonar<Scalar>& sonar,
-                math::Random& random) {
+                math::Random& random) override {
     Heard heard;
     if (!put(echoes, count, heard)) return Status::kBadParameter;
     return Status(filter_->update(heard, &sonar, &random));
@@ -61,17 +88,18 @@ class AnySlat {
     if (!put(echoes, count, heard)) return Status::kBadParameter;
     return Status(filter_->step(dt, u, changes, heard, &sonar, &random));
   }
-  SlaveBelief slave() const {
+  SlaveBelief slave() const override {
     SlaveBelief belief;
     filter_->slave(belief.x, belief.P);
     return belief;
   }
-  MasterBelief master(int n) const {
+  MasterBelief master(int n) const override {
     MasterBelief belief;
     filter_->master(n, belief.x, belief.P);
     return belief;
   }
-  bindings::SlatReadings<Scalar> readings() const {
+  int masters() const override { return readings().masters; }
+  bindings::SlatReadings<Scalar> readings() const override {
     bindings::SlatReadings<Scalar> readings = {};
     filter_->read(readings);
     return readings;
@@ -83,9 +111,13 @@ class AnySlat {
     return std::vector<Scalar>(probabilities, probabilities + count);
   }
   void particles(Scalar* weights, Scalar* poses) const { filter_->particles(weights, poses); }
-  void save(bindings::SlatState<Scalar>& state) const { filter_->save(state); }
-  /// False where it is not the state of such a filter. Then this one must not be used any more.
-  bool restore(const bindings::SlatStateView<Scalar>& state) { return filter_->restore(state); }
+  void save(bindings::SlatState<Scalar>& state) const override { filter_->save(state); }
+  bool restore(const bindings::SlatStateView<Scalar>& state) override {
+    AnySlat twin(*this);
+    if (!twin.filter_->restore(state)) return false;
+    *this = std::move(twin);
+    return true;
+  }
 
  private:
   using Heard = bindings::SlatEchoes<Scalar>;
@@ -105,20 +137,60 @@ class AnySlat {
 
 /// The outage switch of such a filter. A first prediction that is refused has begun to start the
 /// filter, which nobody sees but who saves it: here it is as it was.
-template <class Any>
-class AnyOutage : public Outage<Any, Any::kMasters> {
+template <class Scalar_, int Pose>
+class AnyOutage final : public SlatSteps<Scalar_, Pose> {
  public:
-  using Base = Outage<Any, Any::kMasters>;
-  using Base::Base;
+  using Scalar = Scalar_;
+  using Steps = SlatSteps<Scalar, Pose>;
+  using Steps::kMasters;
+  using typename Steps::Control;
+  using typename Steps::MasterBelief;
+  using typename Steps::SlaveBelief;
+  using typename Steps::VelocityChange;
+  using Filter = AnySlat<Scalar, Pose>;
 
-  Status predict(typename Any::Scalar dt, const typename Any::Control& u, math::Random& random,
-                 const typename Any::VelocityChange* changes = nullptr) {
-    if (this->mode() != Communication::kUp) return Base::predict(dt, u, random, changes);
-    AnyOutage started(*this);
-    const Status status = started.Base::predict(dt, u, random, changes);
-    if (status == Status::kOk) *this = std::move(started);
+  explicit AnyOutage(const Filter& filter) : outage_(filter) {}
+
+  Status share(const SlaveBelief& slave, const MasterBelief* masters, int count) {
+    return outage_.share(slave, masters, count);
+  }
+  Communication mode() const { return outage_.mode(); }
+
+  Status predict(Scalar dt, const Control& u, math::Random& random,
+                 const VelocityChange* changes) override {
+    if (mode() != Communication::kUp) return outage_.predict(dt, u, random, changes);
+    Switch started(outage_);
+    const Status status = started.predict(dt, u, random, changes);
+    if (status == Status::kOk) outage_ = std::move(started);
     return status;
   }
+  Status update(const Echo<Scalar>* echoes, int count, const Sonar<Scalar>& sonar,
+                math::Random& random) override {
+    return outage_.update(echoes, count, sonar, random);
+  }
+  SlaveBelief slave() const override { return outage_.slave(); }
+  MasterBelief master(int n) const override { return outage_.master(n); }
+  int masters() const override {
+    return mode() == Communication::kDown ? readings().masters : outage_.shared_masters();
+  }
+  bindings::SlatReadings<Scalar> readings() const override { return outage_.filter().readings(); }
+  void save(bindings::SlatState<Scalar>& state) const override {
+    StateKeeper<Scalar> keeper(state);
+    Switch::visit_state(outage_, keeper);
+  }
+  bool restore(const bindings::SlatStateView<Scalar>& state) override {
+    StateReturner<Scalar> returner(state);
+    Switch twin(outage_);
+    Switch::visit_state(twin, returner);
+    if (!returner.complete()) return false;
+    outage_ = std::move(twin);
+    return true;
+  }
+
+ private:
+  using Switch = Outage<Filter, kMasters>;
+
+  Switch outage_;
 };
 
 /// An object of auvest's whose bytes come from code that may have another name for its type.

@@ -27,7 +27,8 @@ class SlatBinder {
   using Scalar = typename Motion::Scalar;
   static constexpr int kPose = Motion::kStates;
   using Any = AnySlat<Scalar, kPose>;
-  using Switch = AnyOutage<Any>;
+  using Switch = AnyOutage<Scalar, kPose>;
+  using Steps = SlatSteps<Scalar, kPose>;
   using Master = PiecewiseAcceleration<Scalar>;
   using Echo = auvest::Echo<Scalar>;
   using Change = typename Any::VelocityChange;
@@ -36,8 +37,8 @@ class SlatBinder {
   using Doubles = Array<double>;
 
   static void bind(py::module_& m, const std::string& motion) {
-    py::class_<Any> filter(m, named<Scalar>("Slat_" + motion).c_str());
-    filter
+    bind_steps(py::class_<Steps>(m, named<Scalar>("SlatSteps_" + motion).c_str()));
+    py::class_<Any, Steps>(m, named<Scalar>("Slat_" + motion).c_str())
         .def_static("slatf",
                     static_cast<Any (*)(const py::dict&, const py::dict&, const py::dict&,
                                         const std::string&, int, int, const std::string&)>(&slatf),
@@ -80,11 +81,8 @@ class SlatBinder {
         .def("mode_probabilities", &Any::mode_probabilities, py::arg("n"))
         .def("simulate", &simulate, py::arg("sonar"), py::arg("scenario"), py::arg("seed"),
              py::arg("first_run"), py::arg("runs"));
-    bind_steps(filter);
-    bind_state(filter);
-
-    py::class_<Switch> outage(m, named<Scalar>("SlatOutage_" + motion).c_str());
-    outage.def(py::init([](const Any& f) { return Switch(f); }), py::arg("prototype"))
+    py::class_<Switch, Steps>(m, named<Scalar>("SlatOutage_" + motion).c_str())
+        .def(py::init([](const Any& f) { return Switch(f); }), py::arg("prototype"))
         .def("copy", [](const Switch& f) { return Switch(f); })
         .def("share", &share, py::arg("x").noconvert(), py::arg("P").noconvert(),
              py::arg("masters_x").noconvert(), py::arg("masters_P").noconvert())
@@ -94,105 +92,84 @@ class SlatBinder {
                  : mode == Communication::kDown ? "down"
                                                 : "never";
         });
-    bind_steps(outage);
-    bind_state(outage);
   }
 
  private:
-  template <class Filter>
-  static void bind_steps(py::class_<Filter>& c) {
+  static void bind_steps(py::class_<Steps> c) {
     // False where an argument is not plain: then nothing was done.
     c.def(
          "predict",
-         [](Filter& f, py::handle dt, py::handle u, py::handle changes, math::Random& random) {
+         [](Steps& f, py::handle dt, py::handle u, py::handle changes, math::Random& random) {
            Move move;
-           if (!move.take(dt, u, changes, masters_of(f))) return false;
+           if (!move.take(dt, u, changes, f.masters())) return false;
            require_ok(f.predict(move.dt, move.u, random, move.changes()));
            return true;
          },
          py::arg("dt"), py::arg("u"), py::arg("changes"), py::arg("random"))
         .def(
             "update",
-            [](Filter& f, py::handle z, py::handle master, bool unknown, const Device& sonar,
+            [](Steps& f, py::handle z, py::handle master, bool unknown, const Device& sonar,
                math::Random& random) {
               Echoes echoes;
-              if (!echoes.take(z, master, masters_of(f), unknown)) return false;
+              if (!echoes.take(z, master, f.masters(), unknown)) return false;
               require_ok(f.update(echoes.heard, echoes.count, sonar, random));
               return true;
             },
             py::arg("z"), py::arg("master"), py::arg("unknown"), py::arg("sonar"),
             py::arg("random"))
-        .def_property_readonly("masters", [](const Filter& f) { return masters_of(f); })
-        .def_property_readonly("resamplings",
-                               [](const Filter& f) { return readings_of(f).resamplings; })
-        .def_property_readonly("effective_size",
-                               [](const Filter& f) { return readings_of(f).effective_size; })
-        .def_property_readonly("log_likelihood",
-                               [](const Filter& f) { return readings_of(f).log_likelihood; })
-        .def_property_readonly("nis", [](const Filter& f) { return readings_of(f).nis; })
-        .def_property_readonly("refused", [](const Filter& f) { return readings_of(f).refused; })
-        .def_property_readonly("rebirths", [](const Filter& f) { return readings_of(f).rebirths; })
-        .def_property_readonly("since_rebirth_s",
-                               [](const Filter& f) { return readings_of(f).since_rebirth_s; })
-        .def("run", &run<Filter>, py::arg("time_s").noconvert(), py::arg("u").noconvert(),
+        .def_property_readonly("masters", [](const Steps& f) { return f.masters(); })
+        .def("run", &run, py::arg("time_s").noconvert(), py::arg("u").noconvert(),
              py::arg("changes").noconvert(), py::arg("echo_time_s").noconvert(),
              py::arg("z").noconvert(), py::arg("master").noconvert(), py::arg("sonar"),
              py::arg("random"))
         .def("slave",
-             [](const Filter& f) {
+             [](const Steps& f) {
                const auto b = f.slave();
                return py::make_tuple(to_array(b.x), to_array(b.P));
              })
         .def(
             "master",
-            [](const Filter& f, int n) {
+            [](const Steps& f, int n) {
               const auto b = f.master(n);
               return py::make_tuple(to_array(b.x), to_array(b.P));
             },
-            py::arg("n"));
-  }
-
-  template <class Filter>
-  static void bind_state(py::class_<Filter>& c) {
-    c.def("save",
-          [](const Filter& f) {
-            SlatState<Scalar> state = {};
-            save(f, state);  // counts them
-            py::array_t<Scalar> numbers(static_cast<py::ssize_t>(state.number_count));
-            py::array_t<std::int64_t> counts(static_cast<py::ssize_t>(state.count_count));
-            state.numbers = numbers.mutable_data();
-            state.counts = counts.mutable_data();
-            save(f, state);
-            py::dict result;
-            result["numbers"] = numbers;
-            result["counts"] = counts;
-            return result;
-          })
+            py::arg("n"))
+        .def("save",
+             [](const Steps& f) {
+               SlatState<Scalar> state = {};
+               f.save(state);  // counts them
+               py::array_t<Scalar> numbers(static_cast<py::ssize_t>(state.number_count));
+               py::array_t<std::int64_t> counts(static_cast<py::ssize_t>(state.count_count));
+               state.numbers = numbers.mutable_data();
+               state.counts = counts.mutable_data();
+               f.save(state);
+               py::dict result;
+               result["numbers"] = numbers;
+               result["counts"] = counts;
+               return result;
+             })
         .def(
             "restore",
-            [](Filter& f, const Array<Scalar>& numbers, const Integers& counts) {
+            [](Steps& f, const Array<Scalar>& numbers, const Integers& counts) {
               require_shape(numbers, {-1}, "numbers");
               require_shape(counts, {-1}, "counts");
-              StateReturner<Scalar> returner(
-                  {numbers.data(), static_cast<std::size_t>(numbers.size()), counts.data(),
-                   static_cast<std::size_t>(counts.size())});
-              Filter twin(f);
-              restore(twin, returner);
-              if (!returner.complete()) {
+              if (!f.restore({numbers.data(), static_cast<std::size_t>(numbers.size()),
+                              counts.data(), static_cast<std::size_t>(counts.size())})) {
                 throw py::value_error("numbers and counts are not the state of such a filter");
               }
-              f = std::move(twin);
             },
             py::arg("numbers").noconvert(), py::arg("counts").noconvert());
-  }
-  static void save(const Any& filter, SlatState<Scalar>& state) { filter.save(state); }
-  static void save(const Switch& outage, SlatState<Scalar>& state) {
-    StateKeeper<Scalar> keeper(state);
-    Switch::visit_state(outage, keeper);
-  }
-  static void restore(Any& filter, StateReturner<Scalar>& returner) { returner(filter); }
-  static void restore(Switch& outage, StateReturner<Scalar>& returner) {
-    Switch::visit_state(outage, returner);
+    const auto reading = [&c](const char* name, auto member) {
+      c.def_property_readonly(name, [member](const Steps& f) { return f.readings().*member; });
+    };
+    using Readings = SlatReadings<Scalar>;
+    reading("resamplings", &Readings::resamplings);
+    reading("effective_size", &Readings::effective_size);
+    reading("log_likelihood", &Readings::log_likelihood);
+    reading("nis", &Readings::nis);
+    reading("refused", &Readings::refused);
+    reading("rebirths", &Readings::rebirths);
+    reading("since_rebirth_s", &Readings::since_rebirth_s);
   }
 
   template <class Model>
@@ -406,7 +383,7 @@ class SlatBinder {
                    py::handle master, bool unknown, const Device& sonar, math::Random& random) {
     Move move;
     Echoes echoes;
-    const int masters = masters_of(filter);
+    const int masters = filter.masters();
     if (!move.take(dt, u, changes, masters) || !echoes.take(z, master, masters, unknown)) {
       return false;
     }
@@ -423,17 +400,6 @@ class SlatBinder {
     return py::make_tuple(weights, poses);
   }
 
-  static int masters_of(const Any& filter) { return filter.readings().masters; }
-  static int masters_of(const Switch& outage) {
-    return outage.mode() == Communication::kDown ? outage.filter().readings().masters
-                                                 : outage.shared_masters();
-  }
-
-  static SlatReadings<Scalar> readings_of(const Any& filter) { return filter.readings(); }
-  static SlatReadings<Scalar> readings_of(const Switch& outage) {
-    return outage.filter().readings();
-  }
-
   using Row = SlatRow<Scalar, Any::kMasters, double>;
 
   /// A record of T readings: reading k, u[k], holds from time_s[k] to time_s[k + 1]. Echoes come in
@@ -441,8 +407,7 @@ class SlatBinder {
   /// of what is returned is the state of affairs at time_s[k + 1]. `changes` (T, masters, 2): the
   /// planned velocity changes of each interval, of which an echo in between takes its share; T = 0:
   /// no plan.
-  template <class Filter>
-  static py::dict run(Filter& filter, const Doubles& time_s, const Array<Scalar>& u,
+  static py::dict run(Steps& filter, const Doubles& time_s, const Array<Scalar>& u,
                       const Array<Scalar>& changes, const Doubles& echo_time_s,
                       const Array<Scalar>& z, const Integers& master, const Device& sonar,
                       math::Random& random) {
@@ -520,7 +485,7 @@ class SlatBinder {
       };
       status = run_record<Row>(filter, next, sonar, random, [&](const Row&, Status taken) {
         if (taken != Status::kOk) return;
-        const SlatReadings<Scalar> readings = readings_of(filter);
+        const SlatReadings<Scalar> readings = filter.readings();
         const auto slave = filter.slave();
         copy_to(slave.x, x_out + done * kPose);
         copy_to(slave.P, p_out + done * kPose * kPose);

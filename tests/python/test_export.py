@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -207,6 +208,23 @@ def test_a_folder_without_tables_is_refused(tmp_path: Path) -> None:
     result = call("export", tmp_path, tmp_path / "out")
     assert result.exit_code == 2
     assert "has no estimates.parquet" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("format_name", "message"),
+    [
+        ("foxglove", "MCAP is written with the package mcap: pip install 'auvest[mcap]'"),
+        ("ros2", "ROS bags are written with the package rosbags: pip install 'auvest[ros]'"),
+    ],
+)
+def test_a_missing_package_is_said(
+    results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, format_name: str, message: str
+) -> None:
+    for module in ("mcap.writer", "rosbags.rosbag2"):
+        monkeypatch.setitem(sys.modules, module, None)  # an import of it fails
+    result = call("export", results, tmp_path / "out", "--format", format_name)
+    assert result.exit_code == 2
+    assert message in " ".join(result.stderr.split())
 
 
 def test_tables_that_are_damaged_are_refused(results: Path, tmp_path: Path) -> None:

@@ -48,11 +48,14 @@ static_assert(sizeof(float) == 4 && FLT_RADIX == 2 && FLT_MANT_DIG == 24,
 #endif
 #endif
 
-// Small kernels that must disappear into their caller.
+// Small kernels that must disappear into their caller; where compiling that takes longer than it is
+// worth, a build may define it as inline.
+#if !defined(AUVEST_INLINE)
 #if defined(__AVR__)
 #define AUVEST_INLINE inline
 #else
 #define AUVEST_INLINE inline __attribute__((always_inline))
+#endif
 #endif
 
 // What only hands things on, and takes more flash and stack called than inlined: on every target.

@@ -92,9 +92,7 @@ def export_foxglove(results: ReplayResults, folder: Path) -> dict[str, int]:
     try:
         from mcap.writer import CompressionType, Writer
     except ImportError:
-        raise MissingPackage(
-            "MCAP is written with the package mcap: pip install 'auvest[mcap]'"
-        ) from None
+        raise MissingPackage("MCAP is written", "mcap", "mcap") from None
     counts: Counter[str] = Counter()
     with (folder / "auvest.mcap").open("wb") as file:
         writer = Writer(file, compression=CompressionType.ZSTD)

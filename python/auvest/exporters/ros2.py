@@ -32,9 +32,7 @@ def export_ros2(results: ReplayResults, folder: Path) -> dict[str, int]:
         from rosbags.rosbag2 import StoragePlugin, Writer
         from rosbags.typesys import Stores, get_typestore
     except ImportError:
-        raise MissingPackage(
-            "ROS bags are written with the package rosbags: pip install 'auvest[ros]'"
-        ) from None
+        raise MissingPackage("ROS bags are written", "rosbags", "ros") from None
     store = get_typestore(Stores.ROS2_HUMBLE)
     bag = folder / "bag"
     count = 0

@@ -69,6 +69,9 @@ class RecordingError(LogError):
 class MissingPackage(ValueError):
     """A format needs an optional package that is not installed; the message says which."""
 
+    def __init__(self, what: str, package: str, extra: str) -> None:
+        super().__init__(f"{what} with the package {package}: pip install 'auvest[{extra}]'")
+
 
 class Recording(ABC):
     """One file of a recorder, or a folder if the recorder writes such.

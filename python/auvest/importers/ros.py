@@ -53,9 +53,7 @@ class RosBag(Recording):
             from rosbags.highlevel import AnyReader
             from rosbags.typesys import Stores, get_typestore
         except ImportError:
-            raise MissingPackage(
-                "ROS bags are read with the package rosbags: pip install 'auvest[ros]'"
-            ) from None
+            raise MissingPackage("ROS bags are read", "rosbags", "ros") from None
         store = get_typestore(Stores.ROS2_HUMBLE)
         with AnyReader([self.path], default_typestore=store) as reader:
             wanted = []

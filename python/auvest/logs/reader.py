@@ -253,6 +253,21 @@ class CsvTable:
             return np.full(len(rows), default)
         return rows[:, self.names.index(name)]
 
+    def sources(self, rows: Rows) -> list[int]:
+        """Give the source of each row of the whole file.
+
+        Raises
+        ------
+        LogError
+            If one is there twice.
+        """
+        sources = [int(source) for source in self.column(rows, "source").tolist()]
+        for k, source in enumerate(sources):
+            if source in sources[:k]:
+                message = f"source {source} is there twice"
+                raise LogError(self.path, message, line=k + 2, column="source")
+        return sources
+
     def _cells(self, whole: str, line: int) -> list[str]:
         """Part a line where the separator is not between quotes."""
         text = whole.rstrip("\r\n")
@@ -637,13 +652,7 @@ class LogFolder:
         if "beacons.csv" not in self:
             return {}
         table = self["beacons.csv"]
-        places: dict[int, tuple[float, float, float]] = {}
         rows = table.whole()
-        depths = table.column(rows, "depth_m", 0.0).tolist()
-        for k, ((source, x, y), depth) in enumerate(zip(rows[:, :3].tolist(), depths, strict=True)):
-            if int(source) in places:
-                raise LogError(
-                    table.path, f"source {int(source)} is there twice", line=k + 2, column="source"
-                )
-            places[int(source)] = (x, y, depth)
-        return places
+        depths = table.column(rows, "depth_m", 0.0)
+        places = zip(rows[:, 1].tolist(), rows[:, 2].tolist(), depths.tolist(), strict=True)
+        return dict(zip(table.sources(rows), places, strict=True))

@@ -132,12 +132,9 @@ class Companion(Replay):
             )]
         )  # fmt: skip
         told: list[tuple[float, int, Floats, Floats]] = []
-        for k, (time, source) in enumerate(rows[:, :2].tolist()):
-            if int(source) in (other for _, other, _, _ in told):
-                message = f"source {int(source)} is there twice"
-                raise LogError(table.path, message, line=k + 2, column="source")
+        for k, source in enumerate(table.sources(rows)):
             covariance = np.diag(np.repeat(sigmas[k], 2) ** 2)
-            told.append((max(time, self.start[0]), int(source), means[k], covariance))
+            told.append((max(float(rows[k, 0]), self.start[0]), source, means[k], covariance))
         return sorted(told, key=lambda one: one[0])
 
     def _add_odometry(self, rows: Rows, headings: Rows | None, *, last: bool) -> None:  # noqa: ARG002
