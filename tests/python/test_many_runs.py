@@ -286,6 +286,7 @@ def test_the_result_does_not_depend_on_the_workers():
             {"sensor": ["gps"] * 5},
             "sensor has 5 rows and each run of z has 4; they must have the same",
         ),
+        ({"dt": [[1.0], [1.0, 2.0]]}, "run 0: dt must be an array of shape .T,., not rows of diff"),
         ({"workers": 0}, "workers must lie in 1..256, not 0"),
     ],
 )
