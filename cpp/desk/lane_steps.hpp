@@ -9,8 +9,9 @@
 #include <cstring>
 #include <type_traits>
 
-#include "desk/lane_models.hpp"  // before the filters, which find the functions of lanes
-// clang-format keeps this line: what follows comes behind it.
+#include "desk/lane_models.hpp"
+
+// Behind it, because their templates find the functions of lanes:
 #include "auvest/filters/ekf.hpp"
 #include "auvest/filters/ukf.hpp"
 #include "auvest/robust/rejection_streak.hpp"

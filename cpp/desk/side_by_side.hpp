@@ -279,7 +279,7 @@ class RecordsSideBySide {
  public:
   using Runs = SideBySide<Scalar, N>;
 
-  explicit RecordsSideBySide(Runs& runs, int inputs, bool recovers)
+  RecordsSideBySide(Runs& runs, int inputs, bool recovers)
       : runs_(runs), inputs_(inputs), recovers_(recovers), kept_(kKept) {}
 
   /// Up to kLanes records of as many rows, whose rows have the same sensors.

@@ -400,7 +400,7 @@ CALLS = {
     "run empty list": (lambda f: f.run([], dt=0.5), ValueError, r"z has shape \(0,\), expected"),
     "run one row": (lambda f: f.run([1, 2], dt=0.5), ValueError, r"one row is z\[np\.newaxis\]"),
     "run wide": (lambda f: f.run(Z.T, dt=0.5), ValueError, r"z has shape \(2, 8\)"),
-    "run 3-d": (lambda f: f.run(Z[None], dt=0.5), ValueError, r"z has shape \(1, 8, 2\)"),
+    "run 4-d": (lambda f: f.run(Z[None, None], dt=0.5), ValueError, r"z has shape \(1, 1, 8, 2\)"),
     "run half NaN": (
         lambda f: f.run(changed(Z, (3, 1), NAN), dt=0.5),
         ValueError,

@@ -7,11 +7,12 @@ import math
 
 import numpy as np
 import pytest
-from family_support import ALL, BUILT_IN, PRECISE_CASES, make, record
+from family_support import ALL, BUILT_IN, PRECISE_CASES, make, make_lost, record
 from filter_support import same_bits
 
 import auvest
 from auvest import FilterError, Status, _core
+from auvest.errors import Interrupted
 from auvest.filters import _many
 
 NAN = math.nan
@@ -84,6 +85,17 @@ def test_a_filter_of_late_measurements_takes_stacks_too(name):
     shared = {"input": rows.input, "sensor": rows.sensor, "place": place, "age_s": age}
     result = f.run(z, dt=dt, **shared, workers=2)
     require_each_alone(f, z, result, shared, {"dt": dt})
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_a_gaussian_sum_takes_stacks_too(dtype):
+    f = make_lost(auvest.Ekf, "SpeedHeading", dtype)
+    rows = record(ALL["SpeedHeading"])
+    z, dt = noisy(rows, np.random.default_rng(9))
+    shared = {"input": rows.input, "sensor": rows.sensor, "place": rows.place}
+    result = f.run(z, dt=dt, **shared)
+    require_each_alone(f, z, result, shared, {"dt": dt})
+    assert result.mixture_size.max() > 1
 
 
 # ---- In lanes.
@@ -272,6 +284,25 @@ def test_the_result_does_not_depend_on_the_workers():
         assert same_bits(one[name], many[name]), name
 
 
+def test_after_ctrl_c_the_runs_that_are_done_are_kept(monkeypatch):
+    f = in_lanes(auvest.Ukf, "euler", "float32")
+    z, shared, own = echoes(f, 70, 30)
+    whole = f.run(z, **shared, **own)
+
+    def stop(task, runs, *, chunk, workers):
+        assert (runs, chunk, workers) == (70, 32, 1)
+        raise Interrupted(task(32, 32))  # the second chunk was quicker than the first
+
+    monkeypatch.setattr(_many.montecarlo, "run", stop)
+    with pytest.raises(Interrupted) as interrupt:
+        f.run(z, **shared, **own, workers=1)
+    partial = interrupt.value.partial
+    assert len(partial) == 32
+    for name in whole.columns:
+        assert same_bits(partial[name], whole[name][32:64]), name
+    assert f.x.shape == (6,)  # nobody is inside any more
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -286,6 +317,7 @@ def test_the_result_does_not_depend_on_the_workers():
             {"sensor": ["gps"] * 5},
             "sensor has 5 rows and each run of z has 4; they must have the same",
         ),
+        ({"dt": [[1.0], [1.0, 2.0]]}, "run 0: dt must be an array of shape .T,., not rows of diff"),
         ({"workers": 0}, "workers must lie in 1..256, not 0"),
     ],
 )

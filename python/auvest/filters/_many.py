@@ -35,10 +35,7 @@ def lanes() -> str:
 
 def is_stack(z: object) -> bool:
     """Whether this is an array of three axes: many records."""
-    try:
-        return np.ndim(z) == 3  # type: ignore[arg-type]
-    except ValueError:  # rows of different lengths, which are refused elsewhere
-        return False
+    return _axes(z) == 3
 
 
 def run_many(
@@ -121,9 +118,17 @@ def run_many(
     return _result(filter, columns, ends, covariance)
 
 
+def _axes(value: object) -> int:
+    """Count the axes of what may become an array; 0 if it cannot, which is refused elsewhere."""
+    try:
+        return np.ndim(value)  # type: ignore[arg-type]
+    except ValueError:  # rows of different lengths
+        return 0
+
+
 def _is_per_run(name: str, value: Any, axes: int, runs: int) -> bool:
     """Whether an argument has an axis for the runs in front."""
-    if value is None or np.ndim(value) != axes + 1:
+    if value is None or _axes(value) != axes + 1:
         return False
     if len(value) != runs:
         raise ValueError(f"{name} has {len(value)} runs and z has {runs}; they must have the same")
@@ -132,7 +137,7 @@ def _is_per_run(name: str, value: Any, axes: int, runs: int) -> bool:
 
 def _flat(value: Any, runs: int, own: bool) -> Any:
     """Give an argument of all runs, one behind the other."""
-    if value is None or np.ndim(value) == 0:  # one number for all rows
+    if value is None or _axes(value) == 0:  # one number for all rows
         return value
     array = np.asarray(value)
     if own:
