@@ -10,7 +10,6 @@ ranges. Tables and tracks are written, no report.
 from __future__ import annotations
 
 import argparse
-import os
 import subprocess
 import sys
 import tempfile
@@ -23,6 +22,9 @@ _RUN = """
 import sys, tempfile, time
 from inspect import signature
 from pathlib import Path
+if len(sys.argv) > 2:  # an editable install would be found before what is on the path
+    sys.meta_path[:] = [f for f in sys.meta_path if "_editable_" not in type(f).__module__]
+    sys.path.insert(0, sys.argv[2])
 from auvest.logs import LogFolder
 from auvest.replay import Settings, replay
 chosen = "write" in signature(replay).parameters
@@ -48,11 +50,8 @@ def main() -> None:
         log = long_log(Path(folder) / "log", given.rows)
         for _ in range(given.rounds):
             for tree, runs in found.items():
-                environment = {**os.environ, **({"PYTHONPATH": tree} if tree else {})}
-                program = [sys.executable, "-c", _RUN, str(log)]
-                done = subprocess.run(
-                    program, env=environment, capture_output=True, text=True, check=True
-                )
+                program = [sys.executable, "-c", _RUN, str(log), *([tree] if tree else [])]
+                done = subprocess.run(program, capture_output=True, text=True, check=True)
                 seconds, peak_mb = map(float, done.stdout.split())
                 runs.append((seconds, peak_mb))
     for tree, runs in found.items():
