@@ -124,7 +124,7 @@ TEST_CASE("pivots of which one is behind another that is nearly lost are not wel
   int well = 0;
   for (int round = 0; round < 20000; ++round) {
     double d[6];
-    for (double& pivot : d) pivot = std::pow(10., -3 * random.uniform<double>());
+    for (double& pivot : d) pivot = std::pow(10., -5 * random.uniform<double>());
     Matrix<float, 6, 6> p = product<float, 6>(d, 1.5, random);
     double scale[6];
     for (double& one : scale) one = std::pow(10., 10 * random.uniform<double>() - 5);
@@ -136,5 +136,5 @@ TEST_CASE("pivots of which one is behind another that is nearly lost are not wel
     ++well;
     CHECK(auvest::math::ldlt(p));
   }
-  CHECK(well > 2000);
+  CHECK(well > 100);
 }
