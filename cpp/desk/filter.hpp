@@ -54,8 +54,9 @@ struct Record {
     return sensors[sensor != nullptr ? static_cast<std::size_t>(sensor[k]) : 0];
   }
   bool measured(std::size_t k) const {
+    const Scalar* const measurement = z + k * width;
     bool given = false;
-    for (int i = 0; i < sensor_of(k)->size; ++i) given = given || !math::is_nan(z[k * width + i]);
+    for (int i = 0; i < sensor_of(k)->size; ++i) given = given || !math::is_nan(measurement[i]);
     return given;
   }
   /// Where the sensor of a row stands; null: as the model has it.
