@@ -112,7 +112,7 @@ TEST_CASE("a variance whose pivot may have no inverse in the format is not well 
     for (int i = 0; i < 3; ++i) p(i, i) = static_cast<float>(d[i]);
     CAPTURE(variance);
     // The smallest pivot that is asked for is 64 epsilon of it.
-    const double least = std::numeric_limits<float>::min();
+    const double least = static_cast<double>(std::numeric_limits<float>::min());
     const double noise = 64 * static_cast<double>(std::numeric_limits<float>::epsilon());
     CHECK(is_well_conditioned(p) == (variance * noise > least));
     if (is_well_conditioned(p)) CHECK(auvest::math::is_positive_definite(p));
