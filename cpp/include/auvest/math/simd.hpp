@@ -331,7 +331,8 @@ AUVEST_INLINE Value wrap(const Value& a) {
 
 template <class Arch>
 AUVEST_INLINE DoubleBatch<Arch> absolute(const DoubleBatch<Arch>& x) {
-  return DoubleBatch<Arch>(xsimd::abs(x.v));
+  using Batch = typename DoubleBatch<Arch>::Batch;
+  return DoubleBatch<Arch>(Batch(x.v ^ (x.v & Batch(-0.0))));
 }
 template <class Arch>
 AUVEST_INLINE Mask<DoubleBatch<Arch>> is_finite(const DoubleBatch<Arch>& x) {
