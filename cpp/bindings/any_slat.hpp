@@ -5,7 +5,6 @@
 
 #include <cstring>
 #include <memory>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -15,6 +14,7 @@
 #include "auvest/slat/ekf_slat.hpp"
 #include "auvest/slat/imm_slat.hpp"
 #include "auvest/slat/outage.hpp"
+#include "desk/arrived.hpp"
 #include "slat_interface.hpp"
 #include "slat_state.hpp"
 
@@ -192,15 +192,6 @@ class AnyOutage final : public SlatSteps<Scalar_, Pose> {
 
   Switch outage_;
 };
-
-/// An object of auvest's whose bytes come from code that may have another name for its type.
-template <class Type>
-Type arrived(const void* bytes) {
-  static_assert(std::is_trivially_copyable<Type>::value, "its bytes are all that there is of it");
-  Type object;
-  std::memcpy(&object, bytes, sizeof object);
-  return object;
-}
 
 /// The caller's random generator, for one call.
 class Borrowed {

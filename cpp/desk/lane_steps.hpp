@@ -6,9 +6,6 @@
 // what they do about it is left to the run (lanes.hpp).
 #pragma once
 
-#include <cstring>
-#include <type_traits>
-
 #include "desk/lane_models.hpp"
 
 // Behind it, because their templates find the functions of lanes:
@@ -16,18 +13,10 @@
 #include "auvest/filters/ukf.hpp"
 #include "auvest/robust/rejection_streak.hpp"
 #include "auvest/runtime/any_kernel.hpp"
-#include "desk/lanes.hpp"
+#include "desk/arrived.hpp"
 
 namespace auvest {
 inline namespace AUVEST_INSTRUCTIONS {
-
-/// An object of auvest's whose bytes come from code that may have another name for its type.
-template <class Type>
-AUVEST_INLINE Type object_from(const void* bytes, Type object = Type()) {
-  static_assert(std::is_trivially_copyable<Type>::value, "its bytes are all that there is of it");
-  std::memcpy(static_cast<void*>(&object), bytes, sizeof object);
-  return object;
-}
 
 /// The steps of runs whose numbers lie in batches of this type.
 template <class Value>
@@ -94,7 +83,7 @@ class LaneStep {
   /// The numbers of Params in all lanes.
   template <class Params, class WideParams>
   static AUVEST_INLINE void spread(const void* bytes, WideParams& wide) {
-    auto params = object_from<Params>(bytes);
+    auto params = arrived<Params>(bytes);
     Scalar numbers[16];
     int count = 0;
     params.visit([&](const char*, Scalar& number) { numbers[count++] = number; });
@@ -166,7 +155,7 @@ class LaneStep {
     spread<Params>(sensor.params, model.params);
     using Points = SigmaPoints<Scalar>;
     Points points(typename Points::Params(), N);
-    if (filter.points != nullptr) points = object_from<Points>(filter.points, points);
+    if (filter.points != nullptr) points = arrived<Points>(filter.points, points);
     const Value station[2] = {model.station()[0], model.station()[1]};
     for (int lane = 0; lane < block.runs; lane += Value::kWidth) {
       typename Model::Measurement z;
@@ -250,7 +239,7 @@ class LaneStep {
       return move(belief, root, slope, a, noise, correction.innovation, correction.S,
                   correction.nis);
     }
-    const auto kernel = object_from<AnyKernel<Scalar>>(filter.kernel);
+    const auto kernel = arrived<AnyKernel<Scalar>>(filter.kernel);
     for (int m = 0; m < M; ++m) {
       Scalar* const weights = block.rows.weight[m] + lane;
       for (int i = 0; i < Value::kWidth; ++i) {
@@ -409,16 +398,10 @@ class LaneStep {
       for (int k = 0; k < N; ++k) one_belief.P(k, k) = numbers[row++][i];
       for (int m = 0; m < M; ++m) one.weight(m) = block.rows.weight[m][lane + i];
       using Streak = RejectionStreak<Scalar>;
-      Streak streak(object_from<typename Streak::Params>(filter.streak));
-      streak.count = carried.count;
-      streak.widened = carried.widened;
-      streak.variance = carried.variance;
-      for (int k = 0; k < 6; ++k) streak.recent.data()[k] = carried.recent[k];
+      Streak streak(arrived<typename Streak::Params>(filter.streak));
+      take_up(carried, streak);
       block.rows.recovered[lane + i] = streak.after(one, one_a, one_root, one_belief);
-      carried.count = streak.count;
-      carried.widened = streak.widened;
-      carried.variance = streak.variance;
-      for (int k = 0; k < 6; ++k) carried.recent[k] = streak.recent.data()[k];
+      put_away(streak, carried);
       if (!block.rows.recovered[lane + i]) continue;
       widened = true;
       row -= N;

@@ -12,6 +12,7 @@
 #include "auvest/models/leader_range.hpp"
 #include "auvest/models/range_bearing.hpp"
 #include "auvest/models/speed_heading.hpp"
+#include "desk/arrived.hpp"
 #include "desk/filter.hpp"
 #include "desk/lanes.hpp"
 
@@ -203,22 +204,14 @@ class SideBySide {
       block_.rows.x[i][lane] = belief.x(i);
       for (int j = 0; j <= i; ++j) block_.rows.P[i * (i + 1) / 2 + j][lane] = belief.P(i, j);
     }
-    LaneRecovery<Scalar>& recovery = block_.recovery[lane];
-    recovery.count = streak.count;
-    recovery.widened = streak.widened;
-    recovery.variance = streak.variance;
-    std::copy_n(streak.recent.data(), 6, recovery.recent);
+    put_away(streak, block_.recovery[lane]);
   }
 
   /// A row that is not ordinary, from before it: as a filter takes it.
   Status step_alone(std::size_t sensor, int lane) {
     auto& twin = static_cast<Filter&>(*twin_);
-    const LaneRecovery<Scalar>& recovery = before_recovery_[lane];
     RejectionStreak<Scalar> streak = start_.filter().rule().recovery.streak;
-    streak.count = recovery.count;
-    streak.widened = recovery.widened;
-    streak.variance = recovery.variance;
-    std::copy_n(recovery.recent, 6, streak.recent.data());
+    take_up(before_recovery_[lane], streak);
     twin.filter_.put(belief(before_, lane), streak);
 
     Scalar input[3], z[2], place[2];
