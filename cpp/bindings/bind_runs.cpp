@@ -7,21 +7,6 @@ namespace auvest {
 namespace bindings {
 namespace {
 
-/// Null for none.
-template <class Scalar>
-const desk::LaneSteps<Scalar>* steps_of(const std::string& lanes, desk::LaneSteps<Scalar>& steps) {
-  const std::vector<std::string> sets = instruction_sets(true);
-  if (std::find(sets.begin(), sets.end(), lanes) == sets.end()) {
-    throw py::value_error("lanes must be one of slat_lanes(True)");
-  }
-#if AUVEST_VECTOR_LANES
-  if (lanes == "sse2") steps = run_lanes<InstructionSet::kSse2, Scalar>();
-  if (lanes == "avx2") steps = run_lanes<InstructionSet::kAvx2, Scalar>();
-  if (lanes == "avx512") steps = run_lanes<InstructionSet::kAvx512, Scalar>();
-#endif
-  return lanes == "scalar" ? nullptr : &steps;
-}
-
 /// An array (runs or 1, rows, ...) of a record, or None: what each run has of it.
 template <class Element>
 class OfRuns {

@@ -1,10 +1,15 @@
 #include <pybind11/stl.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
+#include <vector>
 
 #include "auvest/models/range_bearing.hpp"
+#include "desk/side_by_side.hpp"
 #include "handles.hpp"
+#include "run_lanes.hpp"
 #include "simulation/tracking.hpp"
 
 namespace auvest {
@@ -35,123 +40,247 @@ typename Adaptive::State deviate(typename Adaptive::State x, const typename Adap
   return x;
 }
 
-/// Monte Carlo over the closed loop: run r draws from the stream first_run + r of the seed, so
-/// the runs may be shared out to any number of threads. Rows after a run's end are NaN.
-template <class Scalar>
-py::dict simulate(const FilterHandle<Scalar>& handle, const Array<Scalar>& x0,
-                  const Array<Scalar>& p0, const SensorHandle<Scalar>& handle_of_sensor,
-                  const py::dict& scenario) {
-  constexpr int kStates = 6;
-  constexpr int kSize = 2;
-  using Adaptive = typename desk::FilterFor<Scalar, kStates>::Adaptive;
-  require_idle(handle);
-  const Adaptive& prototype = filter_for<Scalar, kStates>(handle).filter();
-  const auto& sensor = model_of<RangeBearing<Scalar, kStates>>(handle_of_sensor);
-  const auto state = to_matrix<kStates, 1>(x0, "x0");
-  const auto covariance = to_matrix<kStates, kStates>(p0, "P0");
-  const Track truth = scenario["track"].cast<Track>();
-  const SensorNoise noise = scenario["noise"].cast<SensorNoise>();
-  const auto seed = scenario["seed"].cast<std::uint64_t>();
-  const auto first_run = scenario["first_run"].cast<std::uint64_t>();
-  const auto runs = scenario["runs"].cast<py::ssize_t>();
-  const auto steps = scenario["steps"].cast<py::ssize_t>();
-  const auto duration_s = scenario["duration_s"].cast<double>();
-  const auto random_start = scenario["random_start"].cast<bool>();
-  TrackingProbe probe;
-  probe.period_s = scenario["probe_period_s"].cast<double>();
-  probe.budget_m = scenario["budget_m"].cast<double>();
+/// Where the samples of all runs go, row by row, and how each run ended.
+struct TrackingColumns {
+  double *time_s, *interval_s, *truth, *z, *x, *covariance, *nis, *tau, *distance;
+  double *square_sum, *above, *count;
+  std::int64_t* samples;
+  std::uint8_t* status;
 
-  const std::vector<py::ssize_t> flat{runs, steps};
-  const std::vector<py::ssize_t> planar{runs, steps, 2};
-  py::array_t<double> time(flat), interval(flat), nis(flat), tau(flat), distance(flat);
-  py::array_t<double> truth_xy(planar), measured(planar);
-  py::array_t<double> x(std::vector<py::ssize_t>{runs, steps, kStates});
-  py::array_t<double> position_covariance(std::vector<py::ssize_t>{runs, steps, 2, 2});
-  py::array_t<double> probe_square(runs), probe_above(runs), probe_count(runs);
-  py::array_t<std::int64_t> samples(runs);
-  py::array_t<std::uint8_t> status(runs);
-  for (auto* array :
-       {&time, &interval, &nis, &tau, &distance, &truth_xy, &measured, &x, &position_covariance}) {
-    std::fill_n(array->mutable_data(), array->size(), std::nan(""));
-  }
-  double* time_out = time.mutable_data();
-  double* interval_out = interval.mutable_data();
-  double* nis_out = nis.mutable_data();
-  double* tau_out = tau.mutable_data();
-  double* distance_out = distance.mutable_data();
-  double* truth_out = truth_xy.mutable_data();
-  double* z_out = measured.mutable_data();
-  double* x_out = x.mutable_data();
-  double* p_out = position_covariance.mutable_data();
-  double* square_out = probe_square.mutable_data();
-  double* above_out = probe_above.mutable_data();
-  double* count_out = probe_count.mutable_data();
-  std::int64_t* samples_out = samples.mutable_data();
-  std::uint8_t* status_out = status.mutable_data();
-  {
-    py::gil_scoped_release release;
-    for (py::ssize_t run = 0; run < runs; ++run) {
-      Adaptive filter = prototype;
-      math::Random random(seed, first_run + static_cast<std::uint64_t>(run));
-      TrackingProbe seen = probe;
-      py::ssize_t row = run * steps;
-      typename Adaptive::Position start;
-      start(0) = static_cast<Scalar>(truth.position[0]);
-      start(1) = static_cast<Scalar>(truth.position[1]);
-      Status result = filter.reset(
-          random_start ? deviate<Adaptive>(state, covariance, random) : state, covariance, start);
-      if (result == Status::kOk) {
-        result = track(filter, sensor, truth, noise, random, static_cast<std::uint32_t>(steps),
-                       duration_s, seen, [&](const TrackingStep<Adaptive, kSize>& step) {
-                         time_out[row] = step.time_s;
-                         interval_out[row] = static_cast<double>(step.filter.interval());
-                         nis_out[row] = static_cast<double>(step.correction.nis);
-                         const auto& law = step.filter.policy().mahalanobis.memory;
-                         tau_out[row] = static_cast<double>(law.tau);
-                         distance_out[row] = static_cast<double>(law.mahalanobis_squared);
-                         const auto p = step.filter.P();
-                         for (int i = 0; i < 2; ++i) {
-                           truth_out[row * 2 + i] = step.truth.position[i];
-                           z_out[row * 2 + i] = step.z[i];
-                           for (int j = 0; j < 2; ++j) {
-                             p_out[row * 4 + i * 2 + j] = static_cast<double>(p(i, j));
-                           }
-                         }
-                         for (int i = 0; i < kStates; ++i) {
-                           x_out[row * kStates + i] = static_cast<double>(step.filter.x()(i));
-                         }
-                         ++row;
-                       });
+  /// x(i) and p(i, j): the estimate and its covariance.
+  template <class Scalar, class State, class Covariance>
+  void put(py::ssize_t row, const TrackingWorld& world, Scalar nis_now, Scalar interval,
+           const AnyInterval<Scalar>& policy, State&& x_of, Covariance&& p_of) const {
+    const auto& law = policy.mahalanobis.memory;
+    time_s[row] = world.time_s;
+    interval_s[row] = static_cast<double>(interval);
+    nis[row] = static_cast<double>(nis_now);
+    tau[row] = static_cast<double>(law.tau);
+    distance[row] = static_cast<double>(law.mahalanobis_squared);
+    for (int i = 0; i < 2; ++i) {
+      truth[row * 2 + i] = world.truth.position[i];
+      z[row * 2 + i] = world.z[i];
+      for (int j = 0; j < 2; ++j) {
+        covariance[row * 4 + i * 2 + j] = static_cast<double>(p_of(i, j));
       }
-      samples_out[run] = row - run * steps;
-      status_out[run] = static_cast<std::uint8_t>(result);
-      square_out[run] = seen.square_sum;
-      above_out[run] = seen.above;
-      count_out[run] = seen.count;
+    }
+    for (int i = 0; i < 6; ++i) x[row * 6 + i] = static_cast<double>(x_of(i));
+  }
+};
+
+/// Monte Carlo over the closed loop: run r draws from the stream first_run + r of the seed, so the
+/// runs may be shared out to any number of threads. Side by side where the filter's models run in
+/// lanes and no error is wanted between samples, one by one where not: the same bits.
+template <class Scalar>
+class TrackingRuns {
+ public:
+  using Filter = desk::FilterFor<Scalar, 6>;
+  using Adaptive = typename Filter::Adaptive;
+  using Sensor = RangeBearing<Scalar, 6>;
+  using Beside = desk::SideBySide<Scalar, 6>;
+
+  TrackingRuns(const FilterHandle<Scalar>& handle, const Array<Scalar>& x0, const Array<Scalar>& p0,
+               const SensorHandle<Scalar>& sensor, const py::dict& scenario,
+               const std::string& lanes)
+      : start_(filter_for<Scalar, 6>(handle)),
+        sensor_(model_of<Sensor>(sensor)),
+        x0_(to_matrix<6, 1>(x0, "x0")),
+        p0_(to_matrix<6, 6>(p0, "P0")),
+        truth_(scenario["track"].cast<Track>()),
+        noise_(scenario["noise"].cast<SensorNoise>()),
+        seed_(scenario["seed"].cast<std::uint64_t>()),
+        first_(scenario["first_run"].cast<std::uint64_t>()),
+        steps_(scenario["steps"].cast<py::ssize_t>()),
+        duration_s_(scenario["duration_s"].cast<double>()),
+        random_start_(scenario["random_start"].cast<bool>()),
+        width_(steps_of(lanes, room_)) {
+    probe_.period_s = scenario["probe_period_s"].cast<double>();
+    probe_.budget_m = scenario["budget_m"].cast<double>();
+  }
+
+  void run(py::ssize_t runs, const TrackingColumns& out) const {
+    Sensor lifted = sensor_;
+    lifted.params.lift_smallest();  // as track() does
+    const typename Beside::Sensors sensors{std::make_shared<desk::SensorOf<Sensor>>(lifted)};
+    const auto started = start_.clone();  // what is not done in lanes is done by copies of it
+    const Scalar there[2] = {static_cast<Scalar>(truth_.position[0]),
+                             static_cast<Scalar>(truth_.position[1])};
+    const Status begun = started->reset(x0_.data(), p0_.data(), there);
+    Beside beside(static_cast<const Filter&>(*started), sensors, width_);
+    const bool possible =
+        begun == Status::kOk && beside.possible() && runs > 1 && !(probe_.period_s > 0);
+    for (py::ssize_t run = 0; run < runs; run += possible ? desk::kLanes : 1) {
+      if (possible) {
+        const auto left = std::min<py::ssize_t>(runs - run, desk::kLanes);
+        side_by_side(beside, run, static_cast<int>(left), out);
+      } else {
+        alone(run, out);
+      }
     }
   }
+
+ private:
+  /// The world of a run, and its filter at the start.
+  TrackingWorld begin(py::ssize_t run, Adaptive& filter, Status& status) const {
+    math::Random random(seed_, first_ + static_cast<std::uint64_t>(run));
+    typename Adaptive::Position start;
+    start(0) = static_cast<Scalar>(truth_.position[0]);
+    start(1) = static_cast<Scalar>(truth_.position[1]);
+    status = filter.reset(random_start_ ? deviate<Adaptive>(x0_, p0_, random) : x0_, p0_, start);
+    return {truth_, noise_, random, static_cast<double>(sensor_.params.station_x_m),
+            static_cast<double>(sensor_.params.station_y_m)};
+  }
+
+  void alone(py::ssize_t run, const TrackingColumns& out) const {
+    Adaptive filter = start_.filter();
+    TrackingProbe seen = probe_;
+    Status status = Status::kOk;
+    TrackingWorld world = begin(run, filter, status);
+    py::ssize_t row = run * steps_;
+    if (status == Status::kOk) {
+      status =
+          track(filter, sensor_, world, static_cast<std::uint32_t>(steps_), duration_s_, seen,
+                [&](const TrackingStep<Adaptive, 2>& step) {
+                  const auto p = filter.P();
+                  out.put(
+                      row, world, step.correction.nis, filter.interval(), filter.policy(),
+                      [&](int i) { return filter.x()(i); }, [&](int i, int j) { return p(i, j); });
+                  ++row;
+                });
+    }
+    out.samples[run] = row - run * steps_;
+    out.status[run] = static_cast<std::uint8_t>(status);
+    out.square_sum[run] = seen.square_sum;
+    out.above[run] = seen.above;
+    out.count[run] = seen.count;
+  }
+
+  /// As alone(), for `count` runs from `first` on.
+  void side_by_side(Beside& beside, py::ssize_t first, int count,
+                    const TrackingColumns& out) const {
+    std::vector<TrackingWorld> worlds;
+    Status status[desk::kLanes];
+    bool on[desk::kLanes];
+    beside.begin(count);
+    for (int lane = 0; lane < count; ++lane) {
+      Adaptive filter = start_.filter();
+      worlds.push_back(begin(first + lane, filter, status[lane]));
+      beside.start(lane, filter);
+      on[lane] = status[lane] == Status::kOk;
+      out.samples[first + lane] = 0;
+    }
+    bool any = true;
+    for (py::ssize_t k = 0; k < steps_ && any; ++k) {
+      for (int lane = 0; lane < count; ++lane) {
+        on[lane] = on[lane] && sample(beside, lane, worlds[static_cast<std::size_t>(lane)]);
+        if (!on[lane]) beside.leave(lane);
+      }
+      beside.step(0);
+      any = false;
+      for (int lane = 0; lane < count; ++lane) {
+        if (!on[lane]) continue;
+        const TrackingWorld& world = worlds[static_cast<std::size_t>(lane)];
+        status[lane] = finish(beside, lane, world);
+        on[lane] = status[lane] == Status::kOk;
+        any = any || on[lane];
+        if (!on[lane]) continue;
+        const auto& rows = beside.rows();
+        const Scalar nis = beside.measured(lane) ? rows.nis[lane] : Scalar(std::nan(""));
+        out.put((first + lane) * steps_ + k, world, nis, beside.interval(lane), beside.policy(lane),
+                [&](int i) { return rows.x[i][lane]; },
+                [&](int i, int j) {
+                  return rows.P[i < j ? j * (j + 1) / 2 + i : i * (i + 1) / 2 + j][lane];
+                });
+        out.samples[first + lane] = k + 1;
+      }
+    }
+    for (int lane = 0; lane < count; ++lane) {
+      out.status[first + lane] = static_cast<std::uint8_t>(status[lane]);
+      out.square_sum[first + lane] = out.above[first + lane] = out.count[first + lane] = 0;
+    }
+  }
+
+  /// Asks for the next sample of a run; whether there is one.
+  bool sample(Beside& beside, int lane, TrackingWorld& world) const {
+    const Scalar interval = beside.interval(lane);
+    if (world.time_s + static_cast<double>(interval) > duration_s_) return false;
+    const bool measured = world.sample(static_cast<double>(interval));
+    const Scalar z[2] = {static_cast<Scalar>(world.z[0]), static_cast<Scalar>(world.z[1])};
+    beside.dt(lane, interval);
+    beside.z(lane, measured ? z : nullptr, 2);
+    return true;
+  }
+
+  /// What a filter says of the sample, and of the position desired then.
+  Status finish(Beside& beside, int lane, const TrackingWorld& world) const {
+    if (beside.status(lane) != Status::kOk) return beside.status(lane);
+    double desired[2];
+    world.truth.desired(world.time_s, desired);
+    const Scalar reference[2] = {static_cast<Scalar>(desired[0]), static_cast<Scalar>(desired[1])};
+    return beside.feedback(lane, reference);
+  }
+
+  const Filter& start_;
+  Sensor sensor_;
+  typename Adaptive::State x0_;
+  typename Adaptive::Covariance p0_;
+  Track truth_;
+  SensorNoise noise_;
+  std::uint64_t seed_, first_;
+  py::ssize_t steps_;
+  double duration_s_;
+  bool random_start_;
+  TrackingProbe probe_;
+  desk::LaneSteps<Scalar> room_;
+  const desk::LaneSteps<Scalar>* width_;
+};
+
+/// Rows after a run's end are NaN.
+template <class Scalar>
+py::dict simulate(const FilterHandle<Scalar>& handle, const Array<Scalar>& x0,
+                  const Array<Scalar>& p0, const SensorHandle<Scalar>& sensor,
+                  const py::dict& scenario, const std::string& lanes) {
+  require_idle(handle);
+  const TrackingRuns<Scalar> tracking(handle, x0, p0, sensor, scenario, lanes);
+  const auto runs = scenario["runs"].cast<py::ssize_t>();
+  const auto steps = scenario["steps"].cast<py::ssize_t>();
   py::dict result;
-  result["time_s"] = time;
-  result["interval_s"] = interval;
-  result["truth"] = truth_xy;
-  result["z"] = measured;
-  result["x"] = x;
-  result["position_covariance"] = position_covariance;
-  result["nis"] = nis;
-  result["tau"] = tau;
-  result["mahalanobis_squared"] = distance;
+  const auto column = [&](const char* name, const std::vector<py::ssize_t>& shape) {
+    py::array_t<double> array(shape);
+    std::fill_n(array.mutable_data(), array.size(), std::nan(""));
+    result[name] = array;
+    return array.mutable_data();
+  };
+  TrackingColumns out;
+  out.time_s = column("time_s", {runs, steps});
+  out.interval_s = column("interval_s", {runs, steps});
+  out.truth = column("truth", {runs, steps, 2});
+  out.z = column("z", {runs, steps, 2});
+  out.x = column("x", {runs, steps, 6});
+  out.covariance = column("position_covariance", {runs, steps, 2, 2});
+  out.nis = column("nis", {runs, steps});
+  out.tau = column("tau", {runs, steps});
+  out.distance = column("mahalanobis_squared", {runs, steps});
+  out.square_sum = column("probe_square_sum", {runs});
+  out.above = column("probe_above", {runs});
+  out.count = column("probe_count", {runs});
+  py::array_t<std::int64_t> samples(runs);
+  py::array_t<std::uint8_t> status(runs);
   result["samples"] = samples;
   result["status"] = status;
-  result["probe_square_sum"] = probe_square;
-  result["probe_above"] = probe_above;
-  result["probe_count"] = probe_count;
+  out.samples = samples.mutable_data();
+  out.status = status.mutable_data();
+  {
+    py::gil_scoped_release release;
+    tracking.run(runs, out);
+  }
   return result;
 }
 
 template <class Scalar>
 void bind_simulation(py::module_& m) {
   m.def("simulate_tracking", &simulate<Scalar>, py::arg("filter"), py::arg("x0").noconvert(),
-        py::arg("P0").noconvert(), py::arg("sensor"), py::arg("scenario"));
+        py::arg("P0").noconvert(), py::arg("sensor"), py::arg("scenario"), py::arg("lanes"));
 }
 
 }  // namespace

@@ -66,16 +66,15 @@ class SideBySide {
   bool possible() const { return possible_; }
 
   void begin(int runs) {
-    const auto& filter = start_.filter();
-    for (int lane = 0; lane < kLanes; ++lane) start(lane, filter.belief(), filter.policy());
+    for (int lane = 0; lane < kLanes; ++lane) start(lane, start_.filter());
     block_.runs = runs;
   }
 
-  /// Begins a run elsewhere.
-  void start(int lane, const Belief<Scalar, N>& belief, const AnyInterval<Scalar>& policy) {
-    put(belief, start_.filter().rule().recovery.streak, lane);
-    policy_[lane] = policy;
-    interval_[lane] = start_.filter().interval();
+  /// Begins a run where this filter is, which differs from the first in nothing else.
+  void start(int lane, const typename Filter::Adaptive& filter) {
+    put(filter.belief(), filter.rule().recovery.streak, lane);
+    policy_[lane] = filter.policy();
+    interval_[lane] = filter.interval();
     for (auto& input : block_.input) input[lane] = Scalar(0);
     this->place(lane, nullptr);
     leave(lane);

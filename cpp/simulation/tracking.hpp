@@ -114,15 +114,48 @@ struct SensorNoise {
   }
 };
 
+/// What a run of the loop measures, sample by sample, whatever filter hears it.
+struct TrackingWorld {
+  Track truth;
+  SensorNoise noise;
+  math::Random random;
+  double station[2];  ///< [m]
+  double time_s;
+  double z[2];  ///< range [m] and bearing [rad]; NaN if missing
+
+  TrackingWorld(const Track& truth_then, const SensorNoise& noise_there, const math::Random& stream,
+                double station_x_m, double station_y_m)
+      : truth(truth_then),
+        noise(noise_there),
+        random(stream),
+        station{station_x_m, station_y_m},
+        time_s(0),
+        z{0, 0} {}
+
+  /// Whether the vehicle was measured this much later.
+  bool sample(double dt) {
+    time_s += dt;
+    truth.advance(dt);
+    double range_noise = 0;
+    double bearing_noise = 0;
+    bool missing = false;
+    noise.draw(random, range_noise, bearing_noise, missing);
+    const double dx = truth.position[0] - station[0];
+    const double dy = truth.position[1] - station[1];
+    // [AUKF 6]
+    z[0] = missing ? std::nan("") : math::sqrt(dx * dx + dy * dy) + range_noise;
+    z[1] = missing ? std::nan("") : math::wrap(math::atan2(dy, dx) + bearing_noise);
+    return !missing;
+  }
+};
+
 /// One sampling instant of the loop.
 template <class Filter, int M>
 struct TrackingStep {
-  double time_s;
   double interval_s;  ///< T(k-1): the interval that led here
-  const Track& truth;
-  const double (&z)[2];  ///< range [m] and bearing [rad]; NaN if missing
-  const Filter& filter;  ///< after update and feedback
-  const Correction<typename Filter::Scalar, M>& correction;
+  const TrackingWorld& world;
+  const Filter& filter;                                      ///< after update and feedback
+  const Correction<typename Filter::Scalar, M>& correction;  ///< its NIS is NaN if z is missing
 };
 
 /// The error between samples, taken at even times: what the interval costs.
@@ -137,22 +170,20 @@ struct TrackingProbe {
 /// Runs the loop for at most `steps` samples and `duration_s` seconds and hands every step to
 /// `sink(step)`. Stops at the first status that is not kOk and returns it.
 template <class Filter, class Model, class Sink>
-inline Status track(Filter& filter, Model model, Track truth, const SensorNoise& noise,
-                    math::Random& random, std::uint32_t steps, double duration_s,
-                    TrackingProbe& probe, Sink&& sink) {
+inline Status track(Filter& filter, Model model, TrackingWorld& world, std::uint32_t steps,
+                    double duration_s, TrackingProbe& probe, Sink&& sink) {
   using Scalar = typename Filter::Scalar;
   using Position = typename Filter::Position;
   model.params.lift_smallest();  // the noise may take the range below 0
-  double time = 0;
   for (std::uint32_t k = 0; k < steps; ++k) {
     const Scalar interval = filter.interval();
     const double dt = static_cast<double>(interval);
-    if (time + dt > duration_s) break;
+    if (world.time_s + dt > duration_s) break;
 
-    while (probe.period_s > 0 && (probe.count + 1) * probe.period_s < time + dt) {
-      const double since_sample = (probe.count + 1) * probe.period_s - time;
+    while (probe.period_s > 0 && (probe.count + 1) * probe.period_s < world.time_s + dt) {
+      const double since_sample = (probe.count + 1) * probe.period_s - world.time_s;
       Filter between = filter;
-      Track there = truth;
+      Track there = world.truth;
       there.advance(since_sample);
       const Status status = between.predict(static_cast<Scalar>(since_sample));
       if (status != Status::kOk) return status;
@@ -164,39 +195,26 @@ inline Status track(Filter& filter, Model model, Track truth, const SensorNoise&
       ++probe.count;
     }
 
-    time += dt;
-    truth.advance(dt);
-    double range_noise = 0;
-    double bearing_noise = 0;
-    bool missing = false;
-    noise.draw(random, range_noise, bearing_noise, missing);
-    const double dx = truth.position[0] - static_cast<double>(model.params.station_x_m);
-    const double dy = truth.position[1] - static_cast<double>(model.params.station_y_m);
-    // [AUKF 6]
-    double z[2] = {math::sqrt(dx * dx + dy * dy) + range_noise,
-                   math::wrap(math::atan2(dy, dx) + bearing_noise)};
-
+    const bool measured = world.sample(dt);
     Status status = filter.predict(interval);
     if (status != Status::kOk) return status;
     Correction<Scalar, Model::kSize> correction(Status::kOk);
-    if (missing) {
-      z[0] = z[1] = std::nan("");
-      correction.nis = Scalar(std::nan(""));
-    } else {
+    correction.nis = Scalar(std::nan(""));
+    if (measured) {
       Vector<Scalar, 2> measurement;
-      measurement(0) = static_cast<Scalar>(z[0]);
-      measurement(1) = static_cast<Scalar>(z[1]);
+      measurement(0) = static_cast<Scalar>(world.z[0]);
+      measurement(1) = static_cast<Scalar>(world.z[1]);
       correction = filter.update(measurement, model);
       if (correction.status != Status::kOk) return correction.status;
     }
     double desired[2];
-    truth.desired(time, desired);
+    world.truth.desired(world.time_s, desired);
     Position reference;
     reference(0) = static_cast<Scalar>(desired[0]);
     reference(1) = static_cast<Scalar>(desired[1]);
     status = filter.feedback(reference);
     if (status != Status::kOk) return status;
-    sink(TrackingStep<Filter, Model::kSize>{time, dt, truth, z, filter, correction});
+    sink(TrackingStep<Filter, Model::kSize>{dt, world, filter, correction});
   }
   return Status::kOk;
 }

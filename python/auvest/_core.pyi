@@ -323,6 +323,7 @@ def simulate_tracking(
     P0: _F32 | _F64,
     sensor: _Sensor[Any],
     scenario: Mapping[str, Any],
+    lanes: str,
 ) -> dict[str, npt.NDArray[Any]]: ...
 
 class SensorNoise(metaclass=_Type):

@@ -32,12 +32,20 @@ Columns: TypeAlias = dict[str, npt.NDArray[Any]]
 Task: TypeAlias = Callable[[int, int], Mapping[str, npt.NDArray[Any]]]
 
 
-def chunk_for(runs: int, rows: int, workers: int | None = None) -> int:
+#: Runs that the core takes side by side.
+LANES = 16
+
+
+def chunk_for(
+    runs: int, rows: int, workers: int | None = None, *, side_by_side: bool = False
+) -> int:
     """Choose the runs per chunk, where each run has so many rows.
 
-    Small enough that progress is seen and that the last worker does not keep the others waiting.
+    Small enough that progress is seen and that the last worker does not keep the others waiting;
+    of runs that the core takes side by side, whole groups.
     """
-    return max(1, min(-(-runs // (4 * as_workers(workers))), 500_000 // rows))
+    chunk = max(1, min(-(-runs // (4 * as_workers(workers))), 500_000 // rows))
+    return -(-chunk // LANES) * LANES if side_by_side and chunk > 1 else chunk
 
 
 def run(

@@ -57,6 +57,8 @@ def test_the_chunk_does_not_matter_either() -> None:
 )
 def test_chunks_are_small_and_even(runs: int, rows: int, workers: int, chunk: int) -> None:
     assert montecarlo.chunk_for(runs, rows, workers) == chunk
+    whole = 1 if chunk == 1 else montecarlo.LANES
+    assert montecarlo.chunk_for(runs, rows, workers, side_by_side=True) == whole
 
 
 def test_csv_keeps_all_digits(tmp_path: Path) -> None:

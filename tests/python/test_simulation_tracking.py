@@ -11,6 +11,8 @@ from filter_support import PAPER, everything, same_bits
 from result_support import tracking_result
 
 import auvest
+from auvest import _core
+from auvest.filters import _many
 from auvest.simulation import tracking
 from auvest.simulation.tracking import Noise, Scenario, Track, simulate
 
@@ -401,3 +403,51 @@ def test_position_at():
     assert turn.position_at(np.pi / 0.1) == pytest.approx((1.0, 12.0), abs=1e-12)
     with pytest.raises(ValueError, match="time_s must not be negative"):
         turn.position_at(-1.0)
+
+
+# ---- Side by side in vector lanes.
+
+
+def require_bits_of_each_alone(f, scenario, lanes, monkeypatch):
+    results = []
+    for width in ("scalar", lanes):
+        monkeypatch.setattr(_many, "lanes", lambda width=width: width)
+        results.append(simulate(f, scenario, workers=1))
+    for name in ARRAYS:
+        assert same_bits(*(getattr(result, name) for result in results)), name
+    return results[0]
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+@pytest.mark.parametrize(
+    "make",
+    [
+        aukf,
+        lambda **options: aukf(policy=auvest.CovarianceBudget(position_sigma_m=0.05), **options),
+        ukf,
+        lambda **options: auvest.Ekf(START, P0, process=EULER, **options),
+    ],
+    ids=["aukf", "budget", "ukf", "ekf"],
+)
+@pytest.mark.parametrize("lanes", ["sse2", "avx2", "avx512"])
+def test_every_width_gives_the_bits_of_each_run_alone(lanes, make, dtype, monkeypatch):
+    """Of a whole block of lanes and the beginning of one, to an end by steps or by the time."""
+    if lanes not in _core.slat_lanes(True):
+        pytest.skip(f"this processor has no {lanes}")
+    noise = Noise(range_m=0.2, dropout=0.2)
+    f = make(dtype=dtype, sensors=auvest.RangeBearing(station=(0.0, 0.5)))
+    for end in ({"steps": 40}, {"steps": 1000, "duration_s": 20.0}):
+        scenario = Scenario(noise=noise, runs=21, random_start=True, **end)
+        result = require_bits_of_each_alone(f, scenario, lanes, monkeypatch)
+        assert not result.failed.any()
+        assert np.isnan(result.nis[~np.isnan(result.time_s)]).any()  # a dropout
+
+
+def test_a_run_that_fails_ends_by_itself(monkeypatch):
+    """As in the test of failures above; its neighbours in the block go on."""
+    noise = Noise(kind="lognormal", range_m=1e18, bearing_rad=0.01)
+    f = ukf(dtype="float32", sensors=auvest.RangeBearing(sigma_range_m=1e18))
+    scenario = Scenario(runs=60, steps=200, noise=noise)
+    lanes = _core.slat_lanes(True)[-1]
+    result = require_bits_of_each_alone(f, scenario, lanes, monkeypatch)
+    assert 0 < result.failed.sum() < 60

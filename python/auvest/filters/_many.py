@@ -22,8 +22,6 @@ from auvest.filters.results import RunResult, RunsResult
 if TYPE_CHECKING:
     from auvest.filters._base import GaussianFilter
 
-#: Runs that the core takes side by side: chunks are made of whole ones.
-_LANES = 16
 #: Rows of a Gaussian sum that take less than half a second.
 _SLOW_ROWS = 16384
 
@@ -104,10 +102,10 @@ def run_many(
             )
             return {"run": np.arange(first, first + count), "rows": done, "status": status}
 
-        chunk = montecarlo.chunk_for(runs, rows, workers)
-        if filter.components > 1:
-            chunk = min(chunk, _SLOW_ROWS // rows)
-        chunk = max(1, -(-chunk // _LANES) * _LANES if chunk > 1 else chunk)
+        several = filter.components > 1
+        chunk = montecarlo.chunk_for(runs, rows, workers, side_by_side=not several)
+        if several:
+            chunk = max(1, min(chunk, _SLOW_ROWS // rows))
         try:
             ends = montecarlo.run(part, runs, chunk=chunk, workers=workers)
         except montecarlo.Interrupted as stop:

@@ -29,7 +29,7 @@ from auvest._fields import (
     pair,
     positive,
 )
-from auvest.filters import Ekf, Ukf
+from auvest.filters import Ekf, Ukf, _many
 from auvest.intervals import FixedInterval
 from auvest.models import ConstantAcceleration, RangeBearing
 from auvest.simulation._runs import Runs, collect, mean_of_rows, nees_of_plane, only_sensor
@@ -327,14 +327,15 @@ def simulate(
     sensor = sensor_of(filter).core(6, filter.dtype)
 
     def part(first: int, count: int) -> dict[str, npt.NDArray[Any]]:
-        return _core.simulate_tracking(core, x0, p0, sensor, _as_core(scenario, first, count))
+        values = _as_core(scenario, first, count)
+        return _core.simulate_tracking(core, x0, p0, sensor, values, _many.lanes())
 
     return collect(
         partial(TrackingResult, scenario=scenario),
         part,
         scenario.runs,
         first=first,
-        chunk=montecarlo.chunk_for(scenario.runs, scenario.steps, workers),
+        chunk=montecarlo.chunk_for(scenario.runs, scenario.steps, workers, side_by_side=True),
         workers=workers,
         progress=progress,
     )

@@ -94,12 +94,12 @@ struct Loop {
     Vector<double, 6> x0;
     x0 << 0.2 + start_error_m, 2, 0.1, 0.2, 0.01, 0.02;
     REQUIRE(filter.reset(x0, 0.01 * Matrix<double, 6, 6>::Identity()) == Status::kOk);
-    auvest::math::Random random(seed, 3);
     const auvest::RangeBearing<double, 6> sonar;
+    auvest::TrackingWorld world(Track(), noise, auvest::math::Random(seed, 3), 0, 0);
     Loop& self = *this;
-    status = auvest::track(filter, sonar, Track(), noise, random, steps, duration_s, probe,
+    status = auvest::track(filter, sonar, world, steps, duration_s, probe,
                            [&self](const auvest::TrackingStep<Filter, 2>& step) {
-                             self.z.push_back(step.z[0]);
+                             self.z.push_back(step.world.z[0]);
                              self.x.push_back(step.filter.x()(0));
                              self.nis.push_back(step.correction.nis);
                            });
