@@ -360,7 +360,10 @@ double least_correlation(Matrix<float, N, N> lower) {
   return Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, N, N>>(p).eigenvalues()(0);
 }
 
-double least(const Ekf& filter) { return least_correlation(filter.belief().P); }
+template <class SlaveMotion, int Masters>
+double least(const auvest::EkfSlat<SlaveMotion, Master<float>, Masters>& filter) {
+  return least_correlation(filter.belief().P);
+}
 double least(const Joint& filter) { return least_correlation(filter.particle(0).P); }
 double least(const Shared& filter) { return least_correlation(filter.covariance()); }
 double least(const Second& filter) { return least_correlation(filter.master(0).P); }
@@ -390,6 +393,39 @@ TEST_CASE("SLAT: covariances stay positive definite when an echo ends hours of s
   check_gaps<Joint>();
   check_gaps<Shared>();
   check_gaps<Second>();
+}
+
+TEST_CASE("SLAT: silences of an hour, again and again, leave covariances and take every echo") {
+  using Unicycle = auvest::EkfSlat<auvest::UnicycleMotion<float>, Master<float>, 2>;
+  double worst = 1;
+  for (std::uint64_t run = 0; run < 60; ++run) {
+    Unicycle filter{auvest::UnicycleMotion<float>(), Master<float>()};
+    Random random(run);
+    const auto even = [&random] { return random.uniform<double>() < 0.5; };
+    Unicycle::SlaveBelief pose;
+    pose.x.setZero();
+    pose.P = 0.01f * Matrix<float, 3, 3>::Identity();
+    REQUIRE(filter.reset(pose, random) == Status::kOk);
+    for (int n = 0; n < 2; ++n) {
+      auto prior = master_belief<float>(300 * random.normal<double>(), 300.0 * n, 0, 0, 1);
+      for (int i = 2; i < 6; ++i) prior.P(i, i) = i < 4 ? 0.1f : 0.01f;
+      REQUIRE(filter.add_master(prior) == Status::kOk);
+    }
+    for (int k = 0; k < 40; ++k) {
+      const Vector<float, 2> u{random.normal<float>(), random.normal<float>()};
+      REQUIRE(filter.predict(even() ? 1.0f : 3600.0f, u, random) == Status::kOk);
+      Echo<float> echo;
+      echo.master = even();
+      const auto master = filter.master(echo.master).x;
+      const auto slave = filter.slave().x;
+      const float x = master(0) - slave(0);
+      const float y = master(1) - slave(1);
+      echo.z << std::hypot(x, y), std::atan2(-y, -x);
+      REQUIRE(filter.update(&echo, 1, good_sonar(), random) == Status::kOk);
+      worst = std::fmin(worst, least(filter));
+    }
+  }
+  CHECK(worst > -15 * 12 * double(auvest::math::machine_epsilon<float>()));  // as above, of fifteen
 }
 
 // ---- A master that is lost ---------------------------------------------------------------------

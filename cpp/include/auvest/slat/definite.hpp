@@ -46,10 +46,12 @@ AUVEST_COLD void raise_lost_pivots(const Vector<Value, U>& before, const Matrix<
       l(i, j) = i == j ? c : Value(c * inverse(j));
     }
     const Value least = noise * before(i);
+    // Not so for masters that were not added; and what is left of a lost pivot's column is noise,
+    // which divided by the pivot would be anything.
+    const math::Mask<Value> there = l(i, i) > Value(0) && !(l(i, i) < least);
     lost = lost || l(i, i) < least;
-    l(i, i) = larger(least, l(i, i));
-    const math::Mask<Value> there = l(i, i) > Value(0);  // not so for masters that were not added
     inverse(i) = select(there, Value(1) / select(there, l(i, i), Value(1)), Value(0));
+    l(i, i) = larger(least, l(i, i));
   }
   for (int i = 0; i < U; ++i) {
     for (int j = 0; j <= i; ++j) {
@@ -78,6 +80,41 @@ AUVEST_INLINE void keep_definite(const Vector<Value, U>& before, const Matrix<Va
   if (any(shrunk)) detail::raise_lost_pivots<O>(before, slope, P);
 }
 
+namespace detail {
+
+/// Raises each variance v that is smaller than its covariances c with others, of variances w,
+/// allow, c^2 <= v w, to the least that they do: it was lost in what it is a difference of. Of two
+/// that do not go together the one that is further from going with all comes first.
+template <class Scalar, int N>
+AUVEST_COLD void raise_lost_variances(Matrix<Scalar, N, N>& P) {
+  for (int pass = 0; pass < N; ++pass) {
+    int lost = -1;
+    Scalar smallest = Scalar(0);
+    Scalar least = Scalar(0);
+    for (int i = 0; i < N; ++i) {
+      Scalar needed = Scalar(0);
+      Scalar sum = Scalar(0);
+      for (int j = 0; j < N; ++j) {
+        if (j == i || !(P(j, j) > Scalar(0))) continue;
+        const Scalar c = i > j ? P(i, j) : P(j, i);
+        const Scalar by_other = c / P(j, j) * c;
+        sum = sum + by_other;
+        if (by_other > needed) needed = by_other;
+      }
+      if (!(P(i, i) < needed)) continue;
+      const Scalar share = P(i, i) / sum;
+      if (lost >= 0 && !(share < smallest)) continue;
+      lost = i;
+      smallest = share;
+      least = needed;
+    }
+    if (lost < 0) return;
+    P(lost, lost) = least;
+  }
+}
+
+}  // namespace detail
+
 /// Raises the variances of a covariance (lower triangle) by what its pivots lack to be more than
 /// rounding noise. For slave and masters whose common drift is so large that what is known of one
 /// relative to the other lies in the last digits. Where a variance would double, as of a matrix
@@ -85,6 +122,7 @@ AUVEST_INLINE void keep_definite(const Vector<Value, U>& before, const Matrix<Va
 template <class Scalar, int N>
 AUVEST_COLD void raise_pivots(Matrix<Scalar, N, N>& P) {
   const Scalar noise = Scalar(16) * math::machine_epsilon<Scalar>();
+  detail::raise_lost_variances(P);
   for (Scalar share = noise;; share = Scalar(4) * share) {
     Matrix<Scalar, N, N> l;  // P = L D L', D on the diagonal
     Vector<Scalar, N> lack;

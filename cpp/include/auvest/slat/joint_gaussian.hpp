@@ -310,7 +310,7 @@ struct JointGaussian {
                    const Posterior<Scalar, kObserved>& posterior, int n, Joint& ordered,
                    Joint& joint) {
     const auto before = unseen_variances<kObserved>(ordered.P);
-    const Scalar few = Scalar(1e4) * math::machine_epsilon<Scalar>();
+    const Scalar few = Scalar(1e5) * math::machine_epsilon<Scalar>();
     // The slave across the line that an echo has left of it, or the master's place relative to the
     // slave, beside their drift: the parts of B cancel.
     bool faint = false;
