@@ -44,7 +44,7 @@ SHORT = 20
 #: What every target replays: each filter once, with both motions, births, echoes of unknown masters
 #: and interacting models among them. A program of all kinds takes a compiler a minute: the others
 #: are for the reference, whose bits Python must have, and where slow tests are asked for.
-CHOSEN = ("slatf1", "slatf2-births", "slatf-joint", "ekf-slat-unicycle", "ekf-slat-imm")
+CHOSEN = ("slatf1", "slatf2-births", "slatf-joint", "ekf-slat", "ekf-slat-unicycle-imm")
 
 
 def all_names_for(target):
