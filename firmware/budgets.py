@@ -24,7 +24,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
@@ -156,12 +156,16 @@ _ADAPTIVE_STEP = """auvest::Status status = filter.predict(filter.interval());
   return status;"""
 
 
-#: A template in SKETCHES, and what stands in its places.
-Program: TypeAlias = tuple[str, Mapping[str, str]]
+class Program(NamedTuple):
+    """A template in SKETCHES, what stands in its places, and the section that is reported."""
+
+    template: str
+    values: Mapping[str, str]
+    section: int = 1
 
 
 def _filter(kind: str, arguments: str, step: str) -> Program:
-    return "filter", {"FILTER": kind, "ARGUMENTS": arguments, "STEP": step}
+    return Program("filter", {"FILTER": kind, "ARGUMENTS": arguments, "STEP": step})
 
 
 #: What follows the number of masters where a filter is the paper's: nothing guards it.
@@ -190,7 +194,7 @@ def _slat(
     if particles:
         places["STORAGE"] = f"Filter::Storage<{particles}> particles;"
         places["PARTICLES"] = ", particles"
-    return "slatf", places
+    return Program("slatf", places)
 
 
 _IMM = "Imm<{}>".format(
@@ -200,24 +204,15 @@ _IMM = "Imm<{}>".format(
     )
 )
 
-#: Parts of a period of the mission, of which the one with number 1 is reported.
-_MISSION_SECTIONS = {
-    "heading_filter": "HEADING",
-    "model_aided_predict": "PREDICT",
-    "model_aided_update": "UPDATE",
-    "guidance_control": "STEER",
-}
-_OTHERS = (("HEADING", "2"), ("PREDICT", "3"), ("UPDATE", "4"), ("STEER", "5"))
 
-_TIMED = {
-    "predict": {"PREDICT": "1", "UPDATE": "2"},
-    "update": {"PREDICT": "2", "UPDATE": "1"},
-}
+def _parts(template: str, *names: str, **values: str) -> dict[str, Program]:
+    """Give a program that is compiled and run once, with the names of its sections from 1 on."""
+    return {name: Program(template, values, section) for section, name in enumerate(names, 1)}
 
-#: The programs of a range filter are one, of which the section with number 1 is reported; so are
-#: those of a mission, of the allocation and of the pilot.
+
+#: By the names of their rows.
 _PROGRAMS: Mapping[str, Program] = {
-    "empty": ("empty", {}),
+    "empty": Program("empty", {}),
     "ekf": _filter("auvest::Ekf<Process>", "Process()", _FIXED_STEP),
     "ukf": _filter("auvest::Ukf<Process>", "Process(), points()", _FIXED_STEP),
     "ckf": _filter("auvest::Ckf<Process>", "Process()", _FIXED_STEP),
@@ -233,28 +228,24 @@ _PROGRAMS: Mapping[str, Program] = {
         "Process(), points()",
         _ADAPTIVE_STEP,
     ),
+    **_parts(
+        *("range_filter", "robust_ekf_predict", "robust_ekf_update"), FILTER="Inside", BYTES="112"
+    ),
+    **_parts(
+        *("range_filter", "unknown_start_predict", "unknown_start_update"),
+        FILTER="auvest::GaussianSum<Inside>",
+        BYTES="600",
+    ),
+    **_parts(
+        "mission", "heading_filter", "model_aided_predict", "model_aided_update", "guidance_control"
+    ),
     **{
-        f"{name}_{step}": ("range_filter", {**_TIMED[step], "FILTER": kind, "BYTES": bytes_})
-        for name, kind, bytes_ in (
-            ("robust_ekf", "Inside", "112"),
-            ("unknown_start", "auvest::GaussianSum<Inside>", "600"),
-        )
-        for step in _TIMED
-    },
-    **{
-        program: ("mission", {name: "1" if name == first else other for name, other in _OTHERS})
-        for program, first in _MISSION_SECTIONS.items()
-    },
-    **{
-        f"hull{n}_{method}": ("hull", {"FREEDOM": freedom, "METHOD": kind})
+        f"hull{n}_{method}": Program("hull", {"FREEDOM": freedom, "METHOD": kind})
         for n, freedom in ((3, "ThreeDof"), (6, "SixDof"))
         for method, kind in (("rk4", "Rk4"), ("semi_implicit", "SemiImplicit"))
     },
-    "rov_allocation": ("allocation", {"ALLOCATE": "1", "INVERT": "2"}),
-    "rov_thrust_inverse": ("allocation", {"ALLOCATE": "2", "INVERT": "1"}),
-    "pilot_steer": ("pilot", {"STEER": "1", "PREDICT": "2", "UPDATE": "3"}),
-    "pilot_predict": ("pilot", {"STEER": "2", "PREDICT": "1", "UPDATE": "3"}),
-    "pilot_update": ("pilot", {"STEER": "2", "PREDICT": "3", "UPDATE": "1"}),
+    **_parts("allocation", "rov_allocation", "rov_thrust_inverse"),
+    **_parts("pilot", "pilot_steer", "pilot_predict", "pilot_update"),
     "slatf1": _slat("Slatf1", AVR_PARTICLES),
     "slatf2": _slat("Slatf2", AVR_PARTICLES),
     "slatf_joint": _slat("SlatfJoint", JOINT_PARTICLES),
@@ -264,10 +255,15 @@ _PROGRAMS: Mapping[str, Program] = {
 }
 
 
+def _sections(program: str) -> list[str]:
+    """Give the rows of the program of a row, in the order of the table."""
+    return [name for name, other in _PROGRAMS.items() if other[:2] == _PROGRAMS[program][:2]]
+
+
 def _source(program: str) -> str:
-    template, values = _PROGRAMS[program]
+    template = _PROGRAMS[program].template
     text = (SKETCHES / f"{template}.ino.in").read_text(encoding="utf-8")
-    for name, value in values.items():
+    for name, value in _PROGRAMS[program].values.items():
         text = text.replace(f"@{name}@", value)
     return text
 
@@ -283,7 +279,7 @@ def _slatf_record() -> bytes:
 @cache
 def _words(program: str) -> bytes:
     """Give the record that a program is played."""
-    template = _PROGRAMS[program][0]
+    template = _PROGRAMS[program].template
     if template == "slatf":
         return _slatf_record()
     return _pilot_record() if template == "pilot" else _record(program)
@@ -291,7 +287,7 @@ def _words(program: str) -> bytes:
 
 def _record(program: str) -> bytes:
     """Start, variances and the steps of a vehicle that circles through the station."""
-    template = _PROGRAMS[program][0]
+    template = _PROGRAMS[program].template
     if template == "range_filter":
         variance = 1e10 if program.startswith("unknown_start") else 4.0
         return _range_record(STEPS[program], variance)
@@ -391,7 +387,8 @@ def measure(output: Path, compiled: Mapping[str, Compiled] | None = None) -> lis
         `empty`, the filters, the examples.
     """
     library = package(output)
-    programs: dict[str, Callable[[Compiled, Path], Row]] = dict.fromkeys(_PROGRAMS, _run_on_board)
+    programs: dict[str, Callable[[Compiled, Path], list[Row]]]
+    programs = {_sections(name)[0]: _run_on_board for name in _PROGRAMS}
     programs["empty"] = _run_empty
     programs["first_steps"] = _run_first_steps
     programs["replay"] = _run_replay
@@ -417,7 +414,7 @@ def measure(output: Path, compiled: Mapping[str, Compiled] | None = None) -> lis
             program: pool.submit(run, ready[program], output / "sketches" / program)
             for program, run in programs.items()
         }
-        return [run.result() for run in runs.values()]
+        return [row for run in runs.values() for row in run.result()]
 
 
 def measure_elsewhere(output: Path, wanted: Iterable[tuple[str, str]] | None = None) -> list[Row]:
@@ -462,11 +459,12 @@ def _measure_small_avr(program: str, folder: Path, library: Path, output: Path) 
             return None
         raise
     try:
-        return _run_on_board(compiled, folder, SMALL_AVR)
+        rows = _run_on_board(compiled, folder, SMALL_AVR)
     except BoardError as error:
         if error.report.reason == "stack overflow":
             return None
         raise
+    return next(row for row in rows if row.program == program)
 
 
 def _measure_chip(chip: chips.Chip, program: str, folder: Path) -> Row:
@@ -488,39 +486,42 @@ def _row(
     return Row(target, program, compiled.flash, compiled.ram, stack_bytes, low, median, high)
 
 
-def _run_empty(compiled: Compiled, folder: Path) -> Row:
+def _run_empty(compiled: Compiled, folder: Path) -> list[Row]:
     with Board(compiled.elf, for_s=0.1) as board:
         report = board.run()
-    return _row(folder.name, compiled, report.stack_bytes, [])
+    return [_row(folder.name, compiled, report.stack_bytes, [])]
 
 
-def _run_on_board(compiled: Compiled, folder: Path, target: str = TARGET) -> Row:
-    """Run the program of a filter on its record."""
-    steps = ECHOES if _PROGRAMS[folder.name][0] == "slatf" else STEPS[folder.name]
+def _run_on_board(compiled: Compiled, folder: Path, target: str = TARGET) -> list[Row]:
+    """Run the program of a filter on its record: a row for each of its sections."""
     record = folder / "record.bin"
     record.write_bytes(_words(folder.name))
     with Board(compiled.elf, mcu=target, input=record, limit_s=1000.0) as board:
         report = board.run()
-    step = report.sections[1]
-    if step.count != steps:
-        raise BudgetError(f"{folder.name}: {step.count} steps instead of {steps}")
-    cycles = [step.minimum, step.median, step.maximum]
-    return _row(folder.name, compiled, report.stack_bytes, cycles, target)
+    rows = []
+    for name in _sections(folder.name):
+        steps = ECHOES if _PROGRAMS[name].template == "slatf" else STEPS[name]
+        step = report.sections[_PROGRAMS[name].section]
+        if step.count != steps:
+            raise BudgetError(f"{name}: {step.count} steps instead of {steps}")
+        cycles = [step.minimum, step.median, step.maximum]
+        rows.append(_row(name, compiled, report.stack_bytes, cycles, target))
+    return rows
 
 
-def _run_first_steps(compiled: Compiled, folder: Path) -> Row:
+def _run_first_steps(compiled: Compiled, folder: Path) -> list[Row]:
     """Measure one run; its cycles are those until its last line is through."""
     with Board(compiled.elf, for_s=1.0) as board:
         lines = [event for event in board if isinstance(event, SerialLine)]
-    return _row(folder.name, compiled, board.report.stack_bytes, [lines[-1].cycle])
+    return [_row(folder.name, compiled, board.report.stack_bytes, [lines[-1].cycle])]
 
 
-def _run_replay(compiled: Compiled, folder: Path) -> Row:
+def _run_replay(compiled: Compiled, folder: Path) -> list[Row]:
     """Measure one run; the sketch counts its cycles itself, in eights."""
     with Board(compiled.elf, for_s=2.0) as board:
         lines = [event.text for event in board if isinstance(event, SerialLine)]
     cycles = [int(line.rsplit(",", 1)[1]) for line in lines if line[:1].isdigit()]
-    return _row(folder.name, compiled, board.report.stack_bytes, cycles)
+    return [_row(folder.name, compiled, board.report.stack_bytes, cycles)]
 
 
 def _samples(
@@ -546,7 +547,7 @@ def _samples(
     return cycles, board.report.stack_bytes
 
 
-def _run_tracking_loop(compiled: Compiled, folder: Path) -> Row:
+def _run_tracking_loop(compiled: Compiled, folder: Path) -> list[Row]:
     """Measure 60 samples of a vehicle at rest: the cycles awake, by the sketch's own clock."""
 
     def answers(line: SerialLine) -> Iterator[tuple[str, float]]:
@@ -555,10 +556,10 @@ def _run_tracking_loop(compiled: Compiled, folder: Path) -> Row:
             yield telemetry.answer(sample, 5.0, 0.5), 0.01
 
     cycles, stack = _samples(compiled.elf, 60, answers)
-    return _row(folder.name, compiled, stack, [round(count) for count in cycles])
+    return [_row(folder.name, compiled, stack, [round(count) for count in cycles])]
 
 
-def _run_slave_tracking(compiled: Compiled, folder: Path) -> Row:
+def _run_slave_tracking(compiled: Compiled, folder: Path) -> list[Row]:
     """Measure 20 pings of the paper's scenario: the cycles awake between two of them."""
     readings = paper_world().readings
 
@@ -574,10 +575,10 @@ def _run_slave_tracking(compiled: Compiled, folder: Path) -> Row:
     cycles, stack = _samples(compiled.elf, 41, answers)
     # The first sample counts the start too.
     pairs = np.array(cycles[1:]).reshape(-1, 2).sum(axis=1)
-    return _row(folder.name, compiled, stack, [round(count) for count in pairs])
+    return [_row(folder.name, compiled, stack, [round(count) for count in pairs])]
 
 
-def _run_beacon_navigation(compiled: Compiled, folder: Path) -> Row:
+def _run_beacon_navigation(compiled: Compiled, folder: Path) -> list[Row]:
     """Measure 40 samples of a vehicle at rest, its ranges 2.3 s late: the cycles awake of each."""
     ranges = (14.142, 110.454, 94.340)  # of (10, 10) m from the sketch's beacons
 
@@ -588,10 +589,10 @@ def _run_beacon_navigation(compiled: Compiled, folder: Path) -> Row:
             yield telemetry.frame(f"RANGE,{sample},{ranges[sample % 3]:.3f}"), 2.3
 
     cycles, stack = _samples(compiled.elf, 40, answers)
-    return _row(folder.name, compiled, stack, [round(count) for count in cycles[4:]])
+    return [_row(folder.name, compiled, stack, [round(count) for count in cycles[4:]])]
 
 
-def _run_power_cuts(compiled: Compiled, folder: Path) -> Row:
+def _run_power_cuts(compiled: Compiled, folder: Path) -> list[Row]:
     """Measure 125 samples, in one of which a checkpoint begins: the cycles awake in each."""
     craft = Craft()
 
@@ -602,16 +603,16 @@ def _run_power_cuts(compiled: Compiled, folder: Path) -> Row:
 
     cycles, stack = _samples(compiled.elf, 126, answers)
     # The first sample counts the start too.
-    return _row(folder.name, compiled, stack, [round(count) for count in cycles[1:]])
+    return [_row(folder.name, compiled, stack, [round(count) for count in cycles[1:]])]
 
 
-def _run_mission(compiled: Compiled, folder: Path) -> Row:
+def _run_mission(compiled: Compiled, folder: Path) -> list[Row]:
     """Measure 60 s of a vehicle in the loop: the cycles awake per sample, telemetry's share too."""
     chip = ChipFlight(Vehicle(chip_mission()))
     fly_simulated(compiled.elf, chip, samples=600)
     samples = np.diff([row["sample"] for row in chip.rows])
     awake_us = np.array([row["awake_us"] for row in chip.rows[1:]]) / samples
-    return _row(folder.name, compiled, chip.stack_bytes, [round(16 * us) for us in awake_us])
+    return [_row(folder.name, compiled, chip.stack_bytes, [round(16 * us) for us in awake_us])]
 
 
 # ---- Compare and write ---------------------------------------------------------------------------

@@ -10,7 +10,8 @@
 //     trace:  status of reset, then per step: x, P, interval, innovation, S, nis, statuses
 //
 // A record of kind kSelfTest has no more words; its trace is what auvest::self_test() reports. One
-// of kind kRobust goes on as replay_robust.hpp says.
+// of kind kRobust goes on as replay_robust.hpp says; AUVEST_WITHOUT_ROBUST, if defined, leaves it
+// out.
 #pragma once
 
 #include "auvest/filters/adaptive_interval.hpp"
@@ -20,7 +21,9 @@
 #include "auvest/models/range_bearing.hpp"
 #include "auvest/runtime/any_interval.hpp"
 #include "auvest/self_test.hpp"
+#if !defined(AUVEST_WITHOUT_ROBUST)
 #include "replay_robust.hpp"
+#endif
 
 namespace auvest {
 namespace parity {
@@ -47,10 +50,12 @@ class Replay {
       stream_.write(result.index);
       return;
     }
+#if !defined(AUVEST_WITHOUT_ROBUST)
     if (kind == kRobust) {
       RobustReplay<Stream>(stream_).run();
       return;
     }
+#endif
     steps_ = stream_.read();
     read_params(points_);
     read_params(noise_);

@@ -549,6 +549,27 @@ def test_lines_of_the_world_wait_for_the_line_to_be_free(compile_avr, board, tmp
     assert output.read_bytes() == b"first\n\nlate\n"
 
 
+# ---- Timers --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("timer", "mode", "clock"),
+    [(1, "TCCR1A = _BV(WGM10)", "TCCR1B = _BV(CS11) | _BV(CS10)"),
+     (2, "TCCR2A = _BV(WGM20)", "TCCR2B = _BV(CS22)")],
+)  # fmt: skip
+def test_a_timer_in_the_mode_of_arduino_s_core_counts(compile_avr, run_board, timer, mode, clock):
+    """To 255 and back, one in 64 cycles: after 6,400 it is at 100, and has not been back at 0."""
+    body = f"""
+    {mode};
+    {clock};
+    __builtin_avr_delay_cycles(6400);
+    const uint8_t count = TCNT{timer};
+    board::write(count);
+    board::write(TIFR{timer} & 1);
+    """
+    assert list(run_board(compile_avr(program(body))).output) == [100, 0]
+
+
 # ---- Sleep ---------------------------------------------------------------------------------------
 
 # Timer1 interrupts every 16,000 cycles; its handler does nothing. r24 counts the wake-ups.

@@ -139,8 +139,9 @@ def test_a_leg_with_the_bits_of_the_desk_and_its_cross_track(sketches, runner):
     assert chip.serial_overruns == 0
     assert np.diff([row["time_s"] for row in chip.rows]) == pytest.approx(0.5, abs=1e-6)
     flown = vehicle.flight
-    desk = fly_on_desk(chip_mission(), 0, rounded=False, delay_s=0.0)
-    settled = flown.settled_rms_m(), desk.settled_rms_m(count=len(flown.pose))
+    samples = len(flown.pose)
+    desk = fly_on_desk(chip_mission(), 0, rounded=False, delay_s=0.0, samples=samples)
+    settled = flown.settled_rms_m(), desk.settled_rms_m()
     print(
         f"settled cross-track {settled[0]:.4f} m with the chip, {settled[1]:.4f} m without; "
         f"awake {chip.awake_share:.1%}, stack {chip.stack_bytes} B, "

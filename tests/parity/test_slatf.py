@@ -41,12 +41,36 @@ ON_CHIP = all_records(chip=True)
 SHORT = 20
 
 
-def names_for(target):
+#: What every target replays: each filter once, with both motions, births, echoes of unknown masters
+#: and interacting models among them. A program of all kinds takes a compiler a minute: the others
+#: are for the reference, whose bits Python must have, and where slow tests are asked for.
+CHOSEN = ("slatf1", "slatf2-births", "slatf-joint", "ekf-slat", "ekf-slat-unicycle-imm")
+
+
+def all_names_for(target):
     """The records of a target. Its program in lanes has the Slatf with one model of a master."""
     names = ON_CHIP if target.machine == "avr" else RECORDS
     if "-DAUVEST_KINDS=0xf" in target.flags:
         return [name for name in names if slatf.KINDS.index(RECORDS[name].kind) < 4]
     return list(names)
+
+
+def is_asked_for(target, name):
+    """Whether a record is replayed. Those of the paper have a program on the chip anyway."""
+    always = target == REFERENCE or name in CHOSEN or (target == IDE and name in PAPER)
+    return asked_for(target) and (ASKED or always)
+
+
+def names_for(target):
+    return [name for name in all_names_for(target) if is_asked_for(target, name)]
+
+
+def program_for(target, name):
+    """The flags of the program: one for each record on the chip, elsewhere one for all."""
+    if ASKED or target == REFERENCE or target.machine == "avr":
+        return record_for(target, name).program(target)
+    kinds = sum({1 << slatf.KINDS.index(RECORDS[name].kind) for name in names_for(target)})
+    return "-UAUVEST_KINDS", f"-DAUVEST_KINDS={kinds}"
 
 
 def record_for(target, name):
@@ -68,7 +92,7 @@ def traces(build, runner, tmp_path_factory):
         found = {}
         for name in names_for(target):
             record = record_for(target, name)
-            program = build(target, *record.program(target))
+            program = build(target, *program_for(target, name))
             files = [folder / f"{target.name}-{name}.{part}" for part in ("record", "trace")]
             files[0].write_bytes(record.to_bytes())
             found[name] = record.trace_of(target.replay(program, *files, runner))
@@ -121,8 +145,8 @@ def first_difference(expected, found):
 
 def pairs():
     for target in SLATF_TARGETS[1:]:
-        marks = () if asked_for(target) else SLOW
-        for name in names_for(target):
+        for name in all_names_for(target):
+            marks = () if is_asked_for(target, name) else SLOW
             yield pytest.param(target, name, id=f"{target.name}-{name}", marks=marks)
 
 
@@ -137,7 +161,8 @@ def test_every_target_gives_the_bits_of_the_host(target, name, traces, wanted):
 
 def in_python():
     for name, record in RECORDS.items():
-        lanes = slat.available_lanes("float32") if name in names_for(SLATF_TARGETS[-1]) else ()
+        laned = name in all_names_for(SLATF_TARGETS[-1])
+        lanes = slat.available_lanes("float32") if laned else ()
         for lane in lanes or ("scalar",):
             yield pytest.param(record, name, lane, id=f"{name}-{lane}")
 

@@ -16,6 +16,7 @@ import pytest
 from conftest import ROOT
 
 import auvest
+from tests.slow import SLOW
 
 EXAMPLE = ROOT / "cpp" / "examples" / "my_models.hpp"
 
@@ -82,6 +83,15 @@ def _own_cache(cache, monkeypatch):
     monkeypatch.delenv("CXX", raising=False)
 
 
+@pytest.fixture
+def quick_compiler(tmp_path_factory, monkeypatch):
+    """Compile without optimisation: a third of the time, where the library's speed is no matter."""
+    script = tmp_path_factory.getbasetemp() / "quick-g++"
+    script.write_text('#!/bin/sh\nexec g++ "$@" -O0\n')
+    script.chmod(0o755)
+    monkeypatch.setenv("CXX", str(script))
+
+
 @pytest.fixture(scope="module")
 def first_load(cache):
     """Load the example in an interpreter of its own; give what that cost."""
@@ -113,12 +123,18 @@ def example(first_load):  # noqa: ARG001
 
 
 @pytest.fixture(scope="module")
-def small_header(tmp_path_factory):
+def written_header(tmp_path_factory):
     """Write SMALL and the header that it includes."""
     header = tmp_path_factory.mktemp("small") / "small.hpp"
     header.write_text(SMALL)
     (header.parent / "constants.hpp").write_text("#pragma once\nconst double kPsd = 0.25;\n")
     return header
+
+
+@pytest.fixture
+def small_header(written_header, quick_compiler):  # noqa: ARG001
+    """Give SMALL, and the compiler that it is compiled with."""
+    return written_header
 
 
 def positions(count=10_000):
@@ -359,21 +375,32 @@ def refused(tmp_path, old, new):
     return lines, SMALL[: SMALL.index(old)].count("\n") + 1
 
 
-@pytest.mark.parametrize("compiler", ["g++", "clang++"])
-@pytest.mark.parametrize(
-    ("old", "new", "struct", "words"),
-    [
-        ("Covariance Q(", "Covariance noise(", "Drift", "your model has no Q(dt): "),
-        ("Measurement h(const", "Measurement value(const", "RangeOnly", "your model has no h(x): "),
-        (
-            "  Noise R()",
-            "  auvest::Matrix<Scalar_, 2, 1> H(const State&) const { return {}; }\n  Noise R()",
-            "RangeOnly",
-            "H(x) of your model must give a Jacobian, a Matrix<Scalar, M, Observed>",
-        ),
-    ],
-    ids=["no Q", "no h", "size of H"],
-)
+LACKING = {
+    "no Q": ("Covariance Q(", "Covariance noise(", "Drift", "your model has no Q(dt): "),
+    "no h": (
+        "Measurement h(const",
+        "Measurement value(const",
+        "RangeOnly",
+        "your model has no h(x): ",
+    ),
+    "size of H": (
+        "  Noise R()",
+        "  auvest::Matrix<Scalar_, 2, 1> H(const State&) const { return {}; }\n  Noise R()",
+        "RangeOnly",
+        "H(x) of your model must give a Jacobian, a Matrix<Scalar, M, Observed>",
+    ),
+}
+
+
+def lacking():
+    """All with g++; clang++ has one form of saying so: one, but where slow tests are asked for."""
+    for compiler in ("g++", "clang++"):
+        for name, case in LACKING.items():
+            marks = () if compiler == "g++" or name == "no h" else SLOW
+            yield pytest.param(compiler, *case, id=f"{name}-{compiler}", marks=marks)
+
+
+@pytest.mark.parametrize(("compiler", "old", "new", "struct", "words"), list(lacking()))
 def test_an_incomplete_model(tmp_path, monkeypatch, compiler, old, new, struct, words):
     if shutil.which(compiler) is None:
         pytest.skip(f"{compiler} is not installed")

@@ -4,6 +4,7 @@
 #include <cstdarg>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <new>
 #include <random>
 #include <stdexcept>
@@ -36,10 +37,24 @@ std::string hex(unsigned value) {
   return text;
 }
 
+/// Arduino's core lets all timers but the first count up and down to 255, a mode that simavr lacks:
+/// there they would overflow at every tick, which took a third of the time of a run, and in sleep
+/// nearly all. Here they count up only.
+void let_timers_count_to_255(avr_t* avr) {
+  for (avr_io_t* part = avr->io_port; part != nullptr; part = part->next) {
+    if (std::strcmp(part->kind, "timer") != 0) continue;
+    avr_timer_wgm_t& mode = reinterpret_cast<avr_timer_t*>(part)->wgm_op[1];
+    if (mode.kind != avr_timer_wgm_none) continue;
+    mode.kind = avr_timer_wgm_normal;
+    mode.size = 8;
+  }
+}
+
 avr_t* make_avr(const ChipOptions& options) {
   avr_t* avr = avr_make_mcu_by_name(options.mcu.c_str());
   if (avr == nullptr) throw std::runtime_error("--mcu: simavr knows no " + options.mcu);
   avr_init(avr);
+  let_timers_count_to_255(avr);
   avr->frequency = options.frequency;
   // simavr reports an access outside of the memory and then does it: give it room for any address.
   constexpr size_t kAddressSpace = 0x10000;
@@ -226,10 +241,10 @@ Outcome Chip::run() {
     pc_ = avr_->pc;
     const bool asleep = avr_->state == cpu_Sleeping;
     const avr_flashaddr_t next = asleep ? pc_ : avr_run_one(avr_);
-    const Cycle until_next_timer = avr_cycle_timer_process(avr_);
+    if (timer_is_due()) avr_cycle_timer_process(avr_);
     avr_->pc = next;
 
-    if (avr_->state == cpu_Sleeping) sleep(until_next_timer);
+    if (avr_->state == cpu_Sleeping) sleep();
     if (avr_->interrupt_state != 0) service_interrupts(asleep);
 
     const int pointer = stack_pointer();
@@ -295,7 +310,13 @@ void Chip::on_serial(Cycle when, uint8_t byte) {
   tell({Event::Kind::kLine, when, line, false});
 }
 
-void Chip::sleep(Cycle until_next_timer) {
+/// Asked after each instruction: a call of simavr would take a third of the instruction's time.
+bool Chip::timer_is_due() const {
+  const avr_cycle_timer_slot_t* next = avr_->cycle_timers.timer;
+  return next != nullptr && next->when <= avr_->cycle;
+}
+
+void Chip::sleep() {
   const uint8_t control = avr_->data[kSmcr];
   if (!(control & kSleepEnable)) {
     avr_->state = cpu_Running;  // sleep without the enable bit does nothing
@@ -305,6 +326,8 @@ void Chip::sleep(Cycle until_next_timer) {
   } else if (!avr_->sreg[S_I]) {
     stop(Reason::kCrashed, "sleep with interrupts disabled, for ever" + where());
   } else {
+    // There is one: that of the limit.
+    const Cycle until_next_timer = avr_->cycle_timers.timer->when - avr_->cycle;
     avr_->cycle += until_next_timer;
     cycles_asleep_ += until_next_timer;
   }

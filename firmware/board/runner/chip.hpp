@@ -108,7 +108,8 @@ class Chip {
   void close_stack_window(int stack_pointer);
   void check_stack(int stack_pointer);
   bool stack_pointer_half_written() const;
-  void sleep(Cycle until_next_timer);
+  bool timer_is_due() const;
+  void sleep();
   void service_interrupts(bool woken);
   std::string where() const;
 

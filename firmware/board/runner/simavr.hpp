@@ -4,6 +4,7 @@
 extern "C" {
 #include <avr_eeprom.h>
 #include <avr_ioport.h>
+#include <avr_timer.h>
 #include <avr_uart.h>
 #include <avr_watchdog.h>
 #include <sim_avr.h>

@@ -292,7 +292,9 @@ def outcome(plan: Mission, chip: ChipFlight) -> montecarlo.Columns:
     vehicle, flown = chip.vehicle, chip.vehicle.flight
     count = len(flown.pose)
     desk, rounded, delayed = (
-        fly_on_desk(plan, vehicle.run, rounded=rounded, delay_s=delay_s).settled_rms_m(count=count)
+        fly_on_desk(
+            plan, vehicle.run, rounded=rounded, delay_s=delay_s, samples=count
+        ).settled_rms_m()
         for rounded, delay_s in ((False, 0.0), (True, 0.0), (False, DELAY_S))
     )
     settled = flown.settled_rms_m()

@@ -156,9 +156,9 @@ class Flight:
         """Cross-track error, root mean square, corners too."""
         return rms(self.beside()[1])
 
-    def settled_rms_m(self, *, settled_m: float = 50.0, count: int | None = None) -> float:
-        """Cross-track error from so far into a leg, root mean square, of the first samples."""
-        along, cross = (values[:count] for values in self.beside())
+    def settled_rms_m(self, *, settled_m: float = 50.0) -> float:
+        """Cross-track error from so far into a leg, root mean square."""
+        along, cross = self.beside()
         return rms(cross[along >= settled_m])
 
     @property
@@ -362,7 +362,9 @@ def sense(world: _core.MissionWorld, sample: int, ping: bool, asked: list[int]) 
     return lines + mission_line.readings(sample, world.sense())
 
 
-def fly_on_desk(plan: Mission, run: int = 0, *, rounded: bool, delay_s: float) -> Flight:
+def fly_on_desk(
+    plan: Mission, run: int = 0, *, rounded: bool, delay_s: float, samples: int | None = None
+) -> Flight:
     """Fly a run with the chip's pilot here.
 
     Parameters
@@ -375,6 +377,8 @@ def fly_on_desk(plan: Mission, run: int = 0, *, rounded: bool, delay_s: float) -
         Whether readings are rounded to the digits of the line's text.
     delay_s : float
         From a sample to the moment at which its command acts.
+    samples : int, optional
+        How many to fly at most; default: to the end of the plan.
 
     Returns
     -------
@@ -390,7 +394,8 @@ def fly_on_desk(plan: Mission, run: int = 0, *, rounded: bool, delay_s: float) -
     else:
         pilot.start(x, y, world.heading_rad)
     held: Steering = _FROM_REST
-    for sample in range(1, int(plan.most_s / PERIOD_S) + 1):
+    most = int(plan.most_s / PERIOD_S)
+    for sample in range(1, (most if samples is None else min(samples, most)) + 1):
         if rounded:
             command = twin.step(sense(world, sample, pilot.wants_fix(), asked))
         else:
