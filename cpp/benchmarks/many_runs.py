@@ -1,4 +1,4 @@
-"""Speed of many runs in one call beside a call for each: one thread, the time of the processor.
+"""Speed of many runs side by side beside one by one: one thread, the time of the processor.
 
     python cpp/benchmarks/many_runs.py [--write docs/speed_runs.md]
 
@@ -20,6 +20,7 @@ from checks import MARGIN, Check, judge, table
 
 import auvest
 from auvest.filters import _many
+from auvest.simulation import paper_aukf, tracking
 
 RUNS = 1000
 ROUNDS = 5
@@ -42,6 +43,13 @@ the rows that their run took by itself.
 The targets are for the machine that these numbers are from; `make bench` fails {margin} beyond.
 
 {ratios}
+
+`simulation.tracking.simulate`, which draws a world for each run and keeps more of it, with its
+filters in the same lanes and one by one; its loop is C++ either way.
+
+| scenario | in lanes / us per step | one by one / us per step | ratio |
+| --- | ---: | ---: | ---: |
+{scenarios}
 """
 
 
@@ -131,6 +139,26 @@ def measure(filter_: Any, z: np.ndarray, given: dict[str, Any]) -> tuple[float, 
     return float(one), float(each)
 
 
+def measure_scenario(dtype: str) -> str:
+    """Return a line on the AUKF paper's scenario."""
+    noise = tracking.Noise(range_m=0.1)
+    ukf = paper_aukf.paper_filter("aukf", noise=noise, dtype=dtype)
+    scenario = tracking.Scenario(noise=noise, runs=RUNS, steps=60)
+    real = _many.lanes
+    times = []
+    for _ in range(ROUNDS):
+        took = []
+        for lanes in (real(), "scalar"):
+            _many.lanes = lambda lanes=lanes: lanes
+            began = time.process_time()
+            tracking.simulate(ukf, scenario, workers=1)
+            took.append(time.process_time() - began)
+        _many.lanes = real
+        times.append(took)
+    beside, alone = 1e6 * np.median(times, axis=0) / (RUNS * 60)
+    return f"| AUKF, {dtype} | {beside:.3f} | {alone:.3f} | {alone / beside:.2f} |"
+
+
 def main() -> int:
     """Measure, write the page, say whether the bounds are kept."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
@@ -148,6 +176,7 @@ def main() -> int:
                 checks.append(
                     Check(f"{name}, {rows} rows: a call each / one call", each / one, ">=", target)
                 )
+    scenarios = "\n".join(measure_scenario(dtype) for dtype in TARGETS)
     if options.write is not None:
         options.write.write_text(
             PAGE.format(
@@ -156,10 +185,11 @@ def main() -> int:
                 times="\n".join(lines),
                 margin=f"{100 * MARGIN:.0f} %",
                 ratios=table(checks),
+                scenarios=scenarios,
             ),
             encoding="utf-8",
         )
-    print("\n".join(lines))
+    print("\n".join(lines), scenarios, sep="\n")
     return judge(checks)
 
 
