@@ -29,7 +29,7 @@ from typing import NamedTuple
 import numpy as np
 
 from auvest import mission_line, telemetry
-from auvest.board import Board, BoardError, SerialLine
+from auvest.board import Board, BoardError, SerialLine, find_runner
 from auvest.firmware.package import package
 from auvest.firmware.sketch import MEGA2560, UNO, Compiled, SketchError, compile_sketch
 from auvest.simulation import cooperative
@@ -929,6 +929,8 @@ def main() -> int:
     arguments = parser.parse_args()
     chosen = [name for name in TARGETS if name in (arguments.target or TARGETS)]
     try:
+        if {TARGET, SMALL_AVR}.intersection(chosen):
+            find_runner()  # before minutes are spent without one
         with tempfile.TemporaryDirectory() as folder:
             rows = measure(Path(folder)) if TARGET in chosen else []
             elsewhere = [name for name in chosen if name != TARGET]
