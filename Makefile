@@ -163,7 +163,9 @@ test-cpp: build-release ## the C++ tests that run for seconds, optimised, and th
 
 # All of them with the other compiler and the newest standard, under the address and
 # undefined-behaviour sanitizers; build-release has gcc and C++11, the Python module C++17. (Any pair
-# has a target; each takes minutes.) That benchmarks and tools compile is shown here, too.
+# has a target; each takes minutes.) Of those that run for seconds the three that sanitizers make
+# longest are left out, unless AUVEST_SLOW_TESTS is set. That benchmarks and tools compile is shown
+# here, too.
 MATRIX := matrix-clang-20
 PAIRS := $(foreach compiler,gcc clang,$(foreach std,11 14 17 20,matrix-$(compiler)-$(std)))
 test-cpp-matrix: $(MATRIX) ## the C++ tests under sanitizers: clang, C++20
@@ -172,6 +174,7 @@ test-cpp-matrix: $(MATRIX) ## the C++ tests under sanitizers: clang, C++20
 $(PAIRS): matrix-%: setup-dev
 	cmake -S . -B build/$@ -G Ninja --log-level=WARNING -D AUVEST_BUILD_TESTS=ON \
 	    -D AUVEST_BUILD_BENCHMARKS=ON -D AUVEST_BUILD_TOOLS=ON -D AUVEST_SYNTAX_ONLY=ON \
+	    -D AUVEST_LONG_TESTS=$(if $(AUVEST_SLOW_TESTS),ON,OFF) \
 	    -D AUVEST_SANITIZE=ON -D CMAKE_BUILD_TYPE=Debug -D CMAKE_CXX_FLAGS_DEBUG=-g1 \
 	    -D CMAKE_CXX_COMPILER=$(if $(findstring clang,$@),clang++,g++) \
 	    -D CMAKE_CXX_STANDARD=$(lastword $(subst -, ,$@))
@@ -180,7 +183,7 @@ $(PAIRS): matrix-%: setup-dev
 
 build-release: setup-dev
 	cmake -S . -B build/release -G Ninja --log-level=WARNING -D AUVEST_BUILD_TESTS=ON \
-	    -D AUVEST_LONG_TESTS_ONLY=ON -D AUVEST_BUILD_EXAMPLES=ON
+	    -D AUVEST_LONG_TESTS=ONLY -D AUVEST_BUILD_EXAMPLES=ON
 	cmake --build build/release
 
 # What libFuzzer finds goes to build/fuzz/crash-*. A long run is worth optimised code:
