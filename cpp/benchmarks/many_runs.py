@@ -142,18 +142,20 @@ def measure(filter_: Any, z: np.ndarray, given: dict[str, Any]) -> tuple[float, 
 def measure_scenario(dtype: str) -> str:
     """Return a line on the AUKF paper's scenario."""
     noise = tracking.Noise(range_m=0.1)
-    ukf = paper_aukf.paper_filter("aukf", noise=noise, dtype=dtype)
+    aukf = paper_aukf.paper_filter("aukf", noise=noise, dtype=dtype)
     scenario = tracking.Scenario(noise=noise, runs=RUNS, steps=60)
     real = _many.lanes
     times = []
     for _ in range(ROUNDS):
-        took = []
+        took, estimates = [], []
         for lanes in (real(), "scalar"):
             _many.lanes = lambda lanes=lanes: lanes
             began = time.process_time()
-            tracking.simulate(ukf, scenario, workers=1)
+            estimates.append(tracking.simulate(aukf, scenario, workers=1).x.tobytes())
             took.append(time.process_time() - began)
         _many.lanes = real
+        if estimates[0] != estimates[1]:
+            raise SystemExit("x differs")
         times.append(took)
     beside, alone = 1e6 * np.median(times, axis=0) / (RUNS * 60)
     return f"| AUKF, {dtype} | {beside:.3f} | {alone:.3f} | {alone / beside:.2f} |"

@@ -47,10 +47,10 @@ struct TrackingColumns {
   std::int64_t* samples;
   std::uint8_t* status;
 
-  /// x(i) and p(i, j): the estimate and its covariance.
-  template <class Scalar, class State, class Covariance>
+  template <class Scalar>
   void put(py::ssize_t row, const TrackingWorld& world, Scalar nis_now, Scalar interval,
-           const AnyInterval<Scalar>& policy, State&& x_of, Covariance&& p_of) const {
+           const AnyInterval<Scalar>& policy, const Vector<Scalar, 6>& estimate,
+           const Matrix<Scalar, 6, 6>& P) const {
     const auto& law = policy.mahalanobis.memory;
     time_s[row] = world.time_s;
     interval_s[row] = static_cast<double>(interval);
@@ -61,10 +61,10 @@ struct TrackingColumns {
       truth[row * 2 + i] = world.truth.position[i];
       z[row * 2 + i] = world.z[i];
       for (int j = 0; j < 2; ++j) {
-        covariance[row * 4 + i * 2 + j] = static_cast<double>(p_of(i, j));
+        covariance[row * 4 + i * 2 + j] = static_cast<double>(P(i, j));
       }
     }
-    for (int i = 0; i < 6; ++i) x[row * 6 + i] = static_cast<double>(x_of(i));
+    for (int i = 0; i < 6; ++i) x[row * 6 + i] = static_cast<double>(estimate(i));
   }
 };
 
@@ -103,9 +103,7 @@ class TrackingRuns {
     lifted.params.lift_smallest();  // as track() does
     const typename Beside::Sensors sensors{std::make_shared<desk::SensorOf<Sensor>>(lifted)};
     const auto started = start_.clone();  // what is not done in lanes is done by copies of it
-    const Scalar there[2] = {static_cast<Scalar>(truth_.position[0]),
-                             static_cast<Scalar>(truth_.position[1])};
-    const Status begun = started->reset(x0_.data(), p0_.data(), there);
+    const Status begun = started->reset(x0_.data(), p0_.data(), desired_at_start().data());
     Beside beside(static_cast<const Filter&>(*started), sensors, width_);
     const bool possible =
         begun == Status::kOk && beside.possible() && runs > 1 && !(probe_.period_s > 0);
@@ -120,13 +118,15 @@ class TrackingRuns {
   }
 
  private:
+  typename Adaptive::Position desired_at_start() const {
+    return {static_cast<Scalar>(truth_.position[0]), static_cast<Scalar>(truth_.position[1])};
+  }
+
   /// The world of a run, and its filter at the start.
   TrackingWorld begin(py::ssize_t run, Adaptive& filter, Status& status) const {
     math::Random random(seed_, first_ + static_cast<std::uint64_t>(run));
-    typename Adaptive::Position start;
-    start(0) = static_cast<Scalar>(truth_.position[0]);
-    start(1) = static_cast<Scalar>(truth_.position[1]);
-    status = filter.reset(random_start_ ? deviate<Adaptive>(x0_, p0_, random) : x0_, p0_, start);
+    status = filter.reset(random_start_ ? deviate<Adaptive>(x0_, p0_, random) : x0_, p0_,
+                          desired_at_start());
     return {truth_, noise_, random, static_cast<double>(sensor_.params.station_x_m),
             static_cast<double>(sensor_.params.station_y_m)};
   }
@@ -138,15 +138,12 @@ class TrackingRuns {
     TrackingWorld world = begin(run, filter, status);
     py::ssize_t row = run * steps_;
     if (status == Status::kOk) {
-      status =
-          track(filter, sensor_, world, static_cast<std::uint32_t>(steps_), duration_s_, seen,
-                [&](const TrackingStep<Adaptive, 2>& step) {
-                  const auto p = filter.P();
-                  out.put(
-                      row, world, step.correction.nis, filter.interval(), filter.policy(),
-                      [&](int i) { return filter.x()(i); }, [&](int i, int j) { return p(i, j); });
-                  ++row;
-                });
+      status = track(filter, sensor_, world, static_cast<std::uint32_t>(steps_), duration_s_, seen,
+                     [&](const TrackingStep<Adaptive, 2>& step) {
+                       out.put(row, world, step.correction.nis, filter.interval(), filter.policy(),
+                               filter.x(), filter.P());
+                       ++row;
+                     });
     }
     out.samples[run] = row - run * steps_;
     out.status[run] = static_cast<std::uint8_t>(status);
@@ -184,13 +181,10 @@ class TrackingRuns {
         on[lane] = status[lane] == Status::kOk;
         any = any || on[lane];
         if (!on[lane]) continue;
-        const auto& rows = beside.rows();
-        const Scalar nis = beside.measured(lane) ? rows.nis[lane] : Scalar(std::nan(""));
+        const auto belief = beside.belief(lane);
+        const Scalar nis = beside.measured(lane) ? beside.rows().nis[lane] : Scalar(std::nan(""));
         out.put((first + lane) * steps_ + k, world, nis, beside.interval(lane), beside.policy(lane),
-                [&](int i) { return rows.x[i][lane]; },
-                [&](int i, int j) {
-                  return rows.P[i < j ? j * (j + 1) / 2 + i : i * (i + 1) / 2 + j][lane];
-                });
+                belief.x, belief.P);
         out.samples[first + lane] = k + 1;
       }
     }

@@ -128,7 +128,7 @@ class SideBySide {
   /// As AdaptiveInterval::feedback(), by the position desired, NaN: the estimate.
   Status feedback(int lane, const Scalar* reference) {
     if (policy_[lane].kind == AnyInterval<Scalar>::Kind::kFixed) return Status::kOk;
-    const Seen seen{start_.filter().process(), belief(block_.rows, lane)};
+    const Seen seen{start_.filter().process(), belief(lane)};
     Vector<Scalar, 2> desired;
     for (int i = 0; i < 2; ++i) {
       desired(i) = math::is_nan(reference[i]) ? seen.x()(i) : reference[i];
@@ -143,6 +143,7 @@ class SideBySide {
   bool alone(int lane) const { return !(block_.ordinary[lane] > Scalar(0)); }
   Scalar interval(int lane) const { return interval_[lane]; }
   const AnyInterval<Scalar>& policy(int lane) const { return policy_[lane]; }
+  Belief<Scalar, N> belief(int lane) const { return belief(block_.rows, lane); }
   /// What the row has told.
   const Rows& rows() const { return block_.rows; }
   bool measured(int lane) const { return measured_[lane]; }

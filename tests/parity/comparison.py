@@ -11,8 +11,10 @@ from tests.slow import ASKED, SLOW
 
 #: Other flags and compilers for machines that the remaining targets have, too; the lanes of SSE2
 #: are those of the Python module as well.
-FURTHER = {"gcc-O3-march=native", "clang-O0", "atmega2560-O2", "cortex-m3"}
-FURTHER.add("clang-O3-march=native-sse2")
+FURTHER = {
+    *("gcc-O3-march=native", "clang-O0", "clang-O3-march=native-sse2"),
+    *("atmega2560-O2", "cortex-m3"),
+}
 
 
 def asked_for(target: Target) -> bool:

@@ -46,10 +46,11 @@ AUVEST_COLD void raise_lost_pivots(const Vector<Value, U>& before, const Matrix<
       l(i, j) = i == j ? c : Value(c * inverse(j));
     }
     const Value least = noise * before(i);
+    const math::Mask<Value> gone = l(i, i) < least;
+    lost = lost || gone;
     // Not so for masters that were not added; and what is left of a lost pivot's column is noise,
     // which divided by the pivot would be anything.
-    const math::Mask<Value> there = l(i, i) > Value(0) && !(l(i, i) < least);
-    lost = lost || l(i, i) < least;
+    const math::Mask<Value> there = l(i, i) > Value(0) && !gone;
     inverse(i) = select(there, Value(1) / select(there, l(i, i), Value(1)), Value(0));
     l(i, i) = larger(least, l(i, i));
   }
