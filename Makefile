@@ -163,10 +163,10 @@ test-cpp: build-release ## the C++ tests that run for seconds, optimised, and th
 
 # All of them with the other compiler and the newest standard, under the address and
 # undefined-behaviour sanitizers; build-release has gcc and C++11, the Python module C++17. (Any pair
-# has a target; each takes minutes.) Of those that run for seconds the three that sanitizers make
-# longest are left out, unless AUVEST_SLOW_TESTS is set. That benchmarks and tools compile is shown
-# here, too.
+# has a target; each takes minutes.) Those that run for seconds are left to build-release, unless
+# AUVEST_SLOW_TESTS is set. That benchmarks and tools compile is shown here, too. A sanitizer's report names functions; for their lines: DEBUG_INFO=-g1
 MATRIX := matrix-clang-20
+DEBUG_INFO := -g0
 PAIRS := $(foreach compiler,gcc clang,$(foreach std,11 14 17 20,matrix-$(compiler)-$(std)))
 test-cpp-matrix: $(MATRIX) ## the C++ tests under sanitizers: clang, C++20
 
@@ -175,7 +175,7 @@ $(PAIRS): matrix-%: setup-dev
 	cmake -S . -B build/$@ -G Ninja --log-level=WARNING -D AUVEST_BUILD_TESTS=ON \
 	    -D AUVEST_BUILD_BENCHMARKS=ON -D AUVEST_BUILD_TOOLS=ON -D AUVEST_SYNTAX_ONLY=ON \
 	    -D AUVEST_LONG_TESTS=$(if $(AUVEST_SLOW_TESTS),ON,OFF) \
-	    -D AUVEST_SANITIZE=ON -D CMAKE_BUILD_TYPE=Debug -D CMAKE_CXX_FLAGS_DEBUG=-g1 \
+	    -D AUVEST_SANITIZE=ON -D CMAKE_BUILD_TYPE=Debug -D CMAKE_CXX_FLAGS_DEBUG=$(DEBUG_INFO) \
 	    -D CMAKE_CXX_COMPILER=$(if $(findstring clang,$@),clang++,g++) \
 	    -D CMAKE_CXX_STANDARD=$(lastword $(subst -, ,$@))
 	cmake --build build/$@
@@ -237,8 +237,8 @@ typecheck: install-editable ## mypy, and the stub of the compiled module against
 	MYPYPATH=python $(VENV)/bin/stubtest auvest._core
 
 # Two at a time: the tests of Python and firmware use one processor, the compilers all.
-check: lint typecheck ## all of these; what CI runs
-	$(MAKE) --jobs=2 --output-sync=target test
+check: install-editable ## all of these; what CI runs
+	$(MAKE) --jobs=2 --output-sync=target lint typecheck test
 
 clean: ## remove what was built (.venv stays)
 	rm -rf build dist $(VENV)/.auvest-*

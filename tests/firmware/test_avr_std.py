@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.slow import SLOW
+
 ROOT = Path(__file__).resolve().parents[2]
 AVR = ("-c", "-mmcu=atmega2560", "-std=gnu++11")
 STRICT = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wdouble-promotion", "-Werror")
@@ -205,10 +207,15 @@ def test_they_give_way_to_a_real_library(compile_cpp, compiler):
         compile_cpp(compiler, source, "-c", "-std=gnu++11", *STRICT, *OUR_PATHS)
 
 
-@pytest.mark.parametrize("header", PUBLIC)
-def test_each_public_header_compiles_alone(compile_cpp, header):
+@pytest.mark.parametrize(
+    "headers",
+    # That each says what it needs is seen with the host's library, too (tests/cpp).
+    [PUBLIC, PUBLIC[::-1], *(pytest.param([header, header], marks=SLOW) for header in PUBLIC)],
+    ids=lambda headers: headers[0] if len(headers) == 2 else f"from {headers[0]}",
+)
+def test_the_public_headers_compile_with_them(compile_cpp, headers):
     options = (*AVR[1:], "-fsyntax-only", *STRICT, *AUVEST_PATHS)  # templates: no code is made
-    compile_cpp("avr-g++", include(header, header), *options)
+    compile_cpp("avr-g++", include(*headers), *options)
 
 
 def test_what_is_not_there_does_not_link(compile_cpp):

@@ -46,11 +46,11 @@ def variants(model: type[Any]) -> Iterator[Any]:
         yield model(**dict(zip(choices, values, strict=True)))
 
 
-def sensor_variants() -> Iterator[auvest.MeasurementModel]:
-    """Every sensor in every size."""
-    for model in SENSORS.values():
-        yield from variants(model)
-    yield auvest.Position(covariance_m2=[[1.0, 0.3, 0.1], [0.3, 2.0, -0.2], [0.1, -0.2, 0.5]])
+#: Every sensor in every size.
+ALL_SENSORS: tuple[auvest.MeasurementModel, ...] = (
+    *itertools.chain.from_iterable(map(variants, SENSORS.values())),
+    auvest.Position(covariance_m2=[[1.0, 0.3, 0.1], [0.3, 2.0, -0.2], [0.1, -0.2, 0.5]]),
+)
 
 
 # ---- Models as functions, which a module names.
@@ -129,7 +129,7 @@ def of_unit(name: str) -> tuple[float, float]:
 def sensors_for(process: auvest.ProcessModel) -> dict[str, auvest.MeasurementModel]:
     """Every sensor that suits the process, the first of them twice."""
     found: dict[str, auvest.MeasurementModel] = {}
-    for model in sensor_variants():
+    for model in ALL_SENSORS:
         try:
             model.check_process(process)
         except ValueError:
