@@ -164,7 +164,8 @@ test-cpp: build-release ## the C++ tests that run for seconds, optimised, and th
 # All of them with the other compiler and the newest standard, under the address and
 # undefined-behaviour sanitizers; build-release has gcc and C++11, the Python module C++17. (Any pair
 # has a target; each takes minutes.) Those that run for seconds are left to build-release, unless
-# AUVEST_SLOW_TESTS is set. That benchmarks and tools compile is shown here, too. A sanitizer's report names functions; for their lines: DEBUG_INFO=-g1
+# AUVEST_SLOW_TESTS is set. That benchmarks and tools compile is shown here, too. A sanitizer's
+# report names functions; for their lines, too: DEBUG_INFO=-g1.
 MATRIX := matrix-clang-20
 DEBUG_INFO := -g0
 PAIRS := $(foreach compiler,gcc clang,$(foreach std,11 14 17 20,matrix-$(compiler)-$(std)))
