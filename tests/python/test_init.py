@@ -93,6 +93,33 @@ def test_what_a_table_is(tmp_path: Path, name: str, header: str, row: str, kind:
     assert found.unknown == ([] if kind else [name])
 
 
+@pytest.mark.parametrize("name", ["time", "Time", "time (s)", "time_sec", "seconds", "t"])
+@pytest.mark.parametrize("file", ["ranges.csv", "nav.csv"])
+def test_a_column_of_seconds_is_one_whatever_its_name(tmp_path: Path, name: str, file: str) -> None:
+    """``time`` of a log is in ISO 8601, but most people call their seconds so."""
+    arc(tmp_path)
+    taken = "ranges.csv" if file == "ranges.csv" else "odometry.csv"
+    header, rows = (tmp_path / taken).read_text().split("\n", 1)
+    (tmp_path / taken).unlink()
+    (tmp_path / file).write_text(f"{header.replace('time_s', name)}\n{rows}")
+    made = first_settings(tmp_path)
+    assert made.files[taken].columns["time_s"] == name
+    assert made.checked.verdict == "sound"
+
+
+def test_names_of_beacons_are_refused_where_they_stand(tmp_path: Path) -> None:
+    arc(tmp_path)
+    for file, column in (("ranges.csv", 1), ("beacons.csv", 0)):
+        header, *rows = [line.split(",") for line in (tmp_path / file).read_text().splitlines()]
+        for row in rows:
+            row[column] = f"B{row[column]}"
+        text = [",".join(["beacon" if one == "source" else one for one in header])]
+        (tmp_path / file).write_text("\n".join([*text, *map(",".join, rows)]) + "\n")
+    (found,) = first_settings(tmp_path).checked.findings
+    assert (found.file, found.line) == ("ranges.csv", 2)
+    assert "column beacon: 'B1' is not a number; sources have numbers" in found.message
+
+
 def test_units_by_name_and_by_size(tmp_path: Path) -> None:
     (tmp_path / "usbl.csv").write_text("t [ms],id,range (cm),bearing\n1,3,50.0,270\n2,3,51,1\n")
     (made,) = guess(tmp_path).files.values()
@@ -149,6 +176,27 @@ def test_the_command_writes_once(tmp_path: Path) -> None:
     assert call("init", tmp_path / "log", "--force", "--quiet").exit_code == 0
     assert path.read_text() != "# mine\n"
     assert "is not a folder" in call("init", tmp_path / "nowhere").stderr
+
+
+def test_the_command_says_what_it_took_for_what_and_what_is_wrong(tmp_path: Path) -> None:
+    log = recorders(tmp_path / "log")
+    (log / "start.csv").unlink()
+    told = call("init", log)
+    lines = told.stdout.splitlines()
+    assert "odometry.csv dvl_export.csv, time_s from 'Timestamp' in ms, speed_m_s from" in lines[1]
+    assert any("no start.csv (time_s,x_m,y_m,heading_rad" in line for line in lines[2:])
+    assert lines[-1] == "verdict     not trusted"
+
+
+@pytest.mark.parametrize("command", ["check", "replay", "calibrate", "compare"])
+def test_settings_beside_a_log_are_not_overlooked_in_silence(tmp_path: Path, command: str) -> None:
+    own = arc(tmp_path / "log") / "auvest.toml"
+    own.write_text("")
+    options = ["--filter", "ekf", "--filter", "ukf"] if command == "compare" else []
+    results = [] if command == "check" else ["--output", tmp_path / "out"]
+    given = [command, tmp_path / "log", *options, *results]
+    assert f"{own} is not read: add --config {own}" in call(*given).stderr.replace("\n", "")
+    assert "is not read" not in call(*given, "--config", own).stderr
 
 
 def test_the_command_prints_the_schema() -> None:

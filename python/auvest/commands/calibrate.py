@@ -66,6 +66,7 @@ def command(
 ) -> None:
     """Calibrate; the help text is the module's."""
     terminal = Terminal(as_json=as_json, quiet=quiet)
+    log_options.note_unread_settings(terminal, config, logs)
     with terminal.usage_errors():
         settings = log_options.settings_of(config, changes, kernel)
         folders = [LogFolder(path, reading=settings.reading) for path in logs]

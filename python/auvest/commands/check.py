@@ -38,6 +38,7 @@ def command(
 ) -> None:
     """Check; the help text is the module's."""
     terminal = Terminal(as_json=as_json, quiet=quiet)
+    log_options.note_unread_settings(terminal, config, logs)
     with terminal.usage_errors():
         settings = log_options.settings_of(config, changes)
         for path in logs:
@@ -64,8 +65,7 @@ def _show(terminal: Terminal, one: Checked) -> None:
         terminal.result(_files(one))
     if one.health is not None and one.health.sources:
         terminal.result(_sources(one))
-    for found in one.findings:
-        terminal.result(f"{found.verdict.replace('_', ' '):11} {found.cause}: {found.text}")
+    log_options.show_findings(terminal, one.findings)
     words = one.verdict.replace("_", " ")
     reason = f", {one.health.reason}" if one.verdict == "sound" and one.health else ""
     terminal.result(f"verdict     {words}{reason}\n")

@@ -62,6 +62,7 @@ def command(
     """Compare; the help text is the module's."""
     terminal = Terminal(as_json=as_json, quiet=quiet)
     log_options.require_smooth(smooth=smooth, lag_s=lag_s)
+    log_options.note_unread_settings(terminal, config, [log])
     with terminal.usage_errors():
         names = [cast(FilterName, filter_named(one, replayable()).name) for one in filters]
         if len(filters) < 2 or len(set(filters)) < len(filters):

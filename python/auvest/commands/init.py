@@ -21,7 +21,7 @@ from typing import Annotated
 
 import typer
 
-from auvest.commands import options
+from auvest.commands import log_options, options
 from auvest.commands.console import Terminal, shown
 from auvest.commands.files import write_text
 from auvest.commands.version import version
@@ -64,7 +64,14 @@ def command(
             "findings": [one.document() for one in made.checked.findings],
         }
     )
-    terminal.result(f"settings  {shown(path)}")
+    terminal.result(f"settings    {shown(path)}")
+    for name, one in made.files.items():
+        taken = [
+            f"{column} from {own!r}" + (f" in {one.units[column]}" if column in one.units else "")
+            for column, own in one.columns.items()
+        ]
+        terminal.result(f"{name:11} {', '.join([one.file or name, *taken])}")
     for name in made.unknown:
         terminal.warn(f"{name}: nothing is known of it")
-    terminal.result(f"verdict   {made.checked.verdict.replace('_', ' ')}")
+    log_options.show_findings(terminal, made.checked.findings)
+    terminal.result(f"verdict     {made.checked.verdict.replace('_', ' ')}")

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from auvest.commands import options
+from auvest.commands.console import Terminal
+from auvest.logs.findings import Finding
 from auvest.replay import Settings, find_settings
 from auvest.replay.config import FilterName, KernelName, packaged_settings
 
@@ -77,3 +79,16 @@ def settings_of(
     """Read the settings that --config names, else the defaults, with --set and --kernel."""
     own = [f"filter.kernel={kernel}"] if kernel is not None else []
     return find_settings(config or "", [*(changes or ()), *own])
+
+
+def note_unread_settings(terminal: Terminal, config: str | None, logs: Sequence[Path]) -> None:
+    """Say so where a log has settings of its own and --config names none."""
+    for path in logs:
+        if config is None and (own := path / "auvest.toml").exists():
+            terminal.warn(f"{own} is not read: add --config {own}")
+
+
+def show_findings(terminal: Terminal, findings: Iterable[Finding]) -> None:
+    """Print a line for each."""
+    for found in findings:
+        terminal.result(f"{found.verdict.replace('_', ' '):11} {found.cause}: {found.text}")

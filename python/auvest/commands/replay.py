@@ -91,6 +91,7 @@ def command(
     if not {*wanted} <= {*WRITTEN}:
         raise typer.BadParameter(f"must be of {', '.join(WRITTEN)}.", param_hint="'--write'")
     formats = FORMATS if kind == "both" else (kind,)
+    log_options.note_unread_settings(terminal, config, logs)
     with terminal.usage_errors():
         settings = log_options.settings_of(config, changes, kernel)
         folders = [LogFolder(path, reading=settings.reading) for path in logs]

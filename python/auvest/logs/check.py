@@ -368,7 +368,7 @@ def survey(log: LogFolder, limits: Limits) -> Survey:
 
 def from_error(error: LogError) -> Finding:
     """Make a finding of what ended the reading."""
-    file = error.path.name if error.path.name in FILES else ""
+    file = "" if error.path.is_dir() else error.path.name
     message = str(error).removeprefix(f"{error.path}, line {error.line}").removeprefix(
         str(error.path)
     )  # fmt: skip

@@ -26,6 +26,7 @@ LINES, LONGEST = 200, 10_000
 #: Names of columns as instruments write them, and the column of a log that each is.
 NAMES: Mapping[str, str] = {
     r"(utc_?)?(date_?)?time(_?stamp)?|stamp|utc|epoch|t|ts|date|received|zeit": "time_s",
+    r"secs?|seconds?": "time_s",
     r"source|beacon|transponder|remote(_id)?|node|leader|ship|station|id|src": "source",
     r"(slant_?)?(range|distance|dist)|slant": "range_m",
     r"lat(itude)?": "latitude_deg",
@@ -185,12 +186,20 @@ def _is_log_file(path: Path, name: str) -> bool:
     if not path.exists():
         return False
     seen = table_of(path)
-    return seen is not None and seen.separator == "," and match(name, seen.header) is not None
+    if seen is None or seen.separator != "," or match(name, seen.header) is None:
+        return False
+    if "time" not in seen.header:
+        return True
+    k = seen.header.index("time")
+    return not _numbers(
+        [row[k] for row in seen.rows], seen.decimal
+    )  # in seconds it has another name
 
 
 def _columns(seen: Table) -> dict[str, tuple[str, str]]:
     """Give the columns of a log that a table seems to have: each one's own name and unit."""
     found: dict[str, tuple[str, str]] = {}
+    named_source = None
     for k, own in enumerate(seen.header):
         name, unit = _parted(own)
         column = name if name in COLUMNS else next(
@@ -199,14 +208,21 @@ def _columns(seen: Table) -> dict[str, tuple[str, str]]:
         if column is None or column in found:
             continue
         cells = [row[k] for row in seen.rows]
-        if column == "time_s" and _all_times(cells):
+        if column in ("time", "time_s") and _all_times(cells):
             column, unit = "time", ""
         elif not _numbers(cells, seen.decimal):
+            if column == "source":
+                named_source = own
             continue
+        elif column == "time":
+            column = "time_s"
         kinds = UNITS.get(COLUMNS[column].unit, {})
         if unit not in kinds:
             unit = _by_size(column, _numbers(cells, seen.decimal))
         found[column] = (own, unit)
+    places = any(word in seen.path.stem.lower() for word in ("beacon", "leader"))
+    if named_source is not None and "source" not in found and ("range_m" in found or places):
+        found["source"] = named_source, ""  # the reader says that it must be a number
     speeds = [one for one in found if COLUMNS[one].unit == "m/s"]
     if any(found[one][1] == "mm/s" for one in speeds):  # of one instrument
         found |= {one: (found[one][0], found[one][1] or "mm/s") for one in speeds}

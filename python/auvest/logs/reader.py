@@ -436,6 +436,8 @@ class CsvTable:
                 what = f"{cell.strip()!r} is not a number" if cell.strip() else "is empty"
                 if given == "time" and cell.strip():
                     what = str(error)
+                elif given == "source" and cell.strip():
+                    what += "; sources have numbers, the same in every file"
                 name = self._header[k].strip()
                 raise LogError(self.path, what, line=line, column=name) from None
         return values

@@ -113,7 +113,10 @@ def seconds_of(text: str) -> float:
     """
     found = _ISO.fullmatch(text.strip().strip('"'))
     if found is None:
-        raise ValueError(f"{text.strip()!r} is not a time in ISO 8601, as 2025-11-28T08:00:00.5Z")
+        raise ValueError(
+            f"{text.strip()!r} is not a time in ISO 8601, as 2025-11-28T08:00:00.5Z; "
+            "a column of seconds is time_s"
+        )
     *numbers, second, fraction, zone = found.groups()
     if zone is None:
         raise ValueError(f"{text.strip()!r} has no zone: Z for UTC, or an offset as +02:00")

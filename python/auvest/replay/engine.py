@@ -389,9 +389,10 @@ class Localiser(Replay):
             start = self._headed(names[0]) if names else None
         if start is None:
             raise LogError(
-                self.log.path, "has neither start.csv nor a truth.csv with heading_rad: "
-                "where does the run start?",
-            )  # fmt: skip
+                self.log.path,
+                "has no start.csv (time_s,x_m,y_m,heading_rad; without heading_rad where a compass "
+                "says it) nor such a line in truth.csv: where does the run start?",
+            )
         return start
 
     def _headed(self, name: str) -> tuple[float, float, float, float]:

@@ -31,12 +31,15 @@ class First:
         The file.
     checked : Checked
         What ``auvest check`` says with it.
+    files : dict of str to FileReading
+        The files of a log that were taken for something, by their names there.
     unknown : list of str
         Tables of which nothing is known.
     """
 
     text: str
     checked: Checked
+    files: dict[str, FileReading]
     unknown: list[str]
 
 
@@ -48,7 +51,8 @@ def first_settings(folder: Path) -> First:
     document = _document(seen)
     settings = replace(settings_from(document, "auvest.toml"), files=files)
     checked = check(folder, settings)
-    return First(_text(document, files, checked, guessed.unknown), checked, guessed.unknown)
+    text = _text(document, files, checked, guessed.unknown)
+    return First(text, checked, files, guessed.unknown)
 
 
 def _document(seen: Checked) -> dict[str, dict[str, Any]]:
