@@ -10,7 +10,8 @@ import math
 import numbers
 import os
 import threading
-from collections.abc import Mapping
+import warnings
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal, NoReturn, TypeAlias
 
 import numpy as np
@@ -151,6 +152,25 @@ def far_from_origin(name: str, place: Floats, dtype: DType) -> str:
         f"there, which is coarse against the sigmas. Subtract a local origin, such as ({origin}), "
         "from all coordinates"
     )
+
+
+def warn_of_degrees(argument: str, names: Sequence[str], rows: Floats, stacklevel: int) -> None:
+    """Warn of a column of angles that jumps further than angles in radians do.
+
+    Those that are wrapped to a turn jump by 2 pi, to a turn of either sign by 4 pi at most.
+    """
+    for k, name in enumerate(names):
+        if not name.endswith("_rad"):
+            continue
+        angles = rows[np.isfinite(rows[:, k]), k]
+        jumps = np.abs(np.diff(angles))
+        if jumps.size > 0 and 4 * math.pi < jumps.max() <= 720:
+            i = int(np.argmax(jumps))
+            warnings.warn(
+                f"{argument}: {name} goes from {angles[i]:.4g} to {angles[i + 1]:.4g} between two "
+                "rows; it is in radians. Degrees? np.radians() converts them",
+                stacklevel=stacklevel + 1,
+            )
 
 
 def impossible_range(name: str, range_m: float, limits: Any) -> str:

@@ -24,6 +24,8 @@ class Result:
     ``result.nis`` and ``result["nis"]`` are the same array. A subclass gives its fields no default.
     """
 
+    _length_of = "rows"
+
     def __post_init__(self) -> None:
         for field in fields(self):
             if self.__dict__[field.name] is None:
@@ -87,7 +89,7 @@ class Result:
 
     def __repr__(self) -> str:
         shapes = ", ".join(f"{name} {self[name].shape}" for name in self.columns)
-        return f"{type(self).__name__}({len(self)} rows: {shapes})"
+        return f"{type(self).__name__}({self._summary()}: {shapes})"
 
     def _repr_html_(self) -> str:
         """Show in a notebook what there is, with the last row."""
@@ -97,10 +99,14 @@ class Result:
             for name in self.columns
         ]
         return (
-            f"<table><caption>{type(self).__name__}, {len(self)} rows</caption>"
+            f"<table><caption>{type(self).__name__}, {self._summary()}</caption>"
             "<thead><tr><th>column</th><th>shape</th><th>dtype</th><th>last row</th></tr></thead>"
             f"<tbody>{''.join(lines)}</tbody></table>"
         )
+
+    def _summary(self) -> str:
+        """Say in a few words what the rows are."""
+        return f"{len(self)} {self._length_of}"
 
     def _no_column(self, name: str) -> str:
         there = f"{type(self).__name__} has {', '.join(self.columns)}"

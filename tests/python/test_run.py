@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+import warnings
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -77,6 +78,77 @@ def test_run_with_the_filters_own_interval(law, dtype):
         assert same_bits(result.x[k], b.x)
     assert everything(a) == everything(b)
     assert a.interval == result.interval_s[-1]
+
+
+def test_counts_are_those_of_single_steps():
+    """What became of the measurements is said where a result is shown."""
+
+    def ranging():
+        sensor = auvest.LeaderRange(leader=(200.0, 250.0))
+        process = auvest.SpeedHeading()
+        start = ([0.0, 0.0], np.eye(2))
+        return auvest.RobustEkf(*start, process=process, sensors=sensor, late_s=3)
+
+    rng = np.random.default_rng(1)
+    gone = np.arange(1, 101)
+    z = np.hypot(200 - gone, 250) + rng.standard_normal(100)
+    z[20:60:10] += [2.8, -2.8, 60, 90]
+    z[70:73] = np.nan
+    age_s = np.zeros(100)
+    age_s[80] = 5
+    given = {"dt": 1.0, "input": np.tile([1.0, 0.0, 0.0], (100, 1)), "age_s": age_s}
+    single = ranging()
+    decisions = []
+    for k in range(100):
+        single.predict(1.0, [1.0, 0.0, 0.0])
+        if np.isfinite(z[k]) and age_s[k] == 0:
+            single.update(z[k])
+            decisions.append(single.report.decision.name)
+    wanted = {name: decisions.count(name) for name in ("accepted", "downweighted", "rejected")}
+    assert wanted["rejected"] == 2
+    assert 0 < wanted["downweighted"] < 10
+    result = ranging().run(z, **given)
+    assert result.counts == {**wanted, "missing": 3, "too_late": 1, "recovered": 0}
+    said = f"100 rows, {wanted['accepted']} accepted, {wanted['downweighted']} downweighted, "
+    assert f"({said}2 rejected, 3 missing, 1 too late: x (100, 2)" in repr(result)
+    assert said in result._repr_html_()
+    # Of many runs those rows that were done: the second ends before its row 10.
+    dt = np.ones((2, 100))
+    dt[1, 10] = 1e9
+    both = ranging().run(np.stack([z, z])[..., np.newaxis], **{**given, "dt": dt})
+    assert repr(both).startswith("RunsResult(2 runs, ")
+    ten = ranging().run(z[:10], **{**given, "input": given["input"][:10], "age_s": age_s[:10]})
+    assert both.counts == {name: n + ten.counts[name] for name, n in result.counts.items()}
+
+
+def headed(heading, sensors):
+    """A record of 100 s: a heading drives the process and fixes come, or it is a bearing."""
+    if isinstance(sensors, auvest.Position):
+        process = auvest.SpeedHeading()
+        filter_ = auvest.Ekf(np.zeros(2), np.eye(2), process=process, sensors=sensors)
+        return filter_, np.zeros((100, 2)), np.stack([np.ones(100), np.zeros(100), heading], 1)
+    process = auvest.WhiteAcceleration()
+    filter_ = auvest.Ekf([50.0, 0, 0, 0], np.eye(4), process=process, sensors=sensors)
+    return filter_, np.stack([np.full(100, 50.0), heading], 1), None
+
+
+@pytest.mark.parametrize("sensors", [auvest.Position(), auvest.RangeBearing()])
+def test_angles_in_degrees_are_suspected(sensors):
+    """Through north they jump by 360; radians that are wrapped, or not, by 4 pi at most."""
+    degrees = (350 + 0.2 * np.arange(100)) % 360
+    where = "input: heading_rad" if isinstance(sensors, auvest.Position) else "z: bearing_rad"
+    for many in (False, True):
+        filter_, z, driven = headed(degrees, sensors)
+        z = np.stack([z, z]) if many else z
+        with pytest.warns(UserWarning, match=f"{where} goes from 359.8 to 0 .*Degrees") as told:
+            filter_.run(z, dt=1.0, input=driven)
+        assert told[0].filename == __file__
+    turns = np.radians(7.0 * np.arange(100))  # almost two, not wrapped
+    for radians in (turns + 100, np.remainder(turns, 2 * np.pi), np.radians(degrees)):
+        filter_, z, driven = headed(radians, sensors)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            filter_.run(z, dt=1.0, input=driven)
 
 
 @pytest.mark.parametrize("kind", FILTERS)

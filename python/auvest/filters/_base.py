@@ -34,6 +34,7 @@ from auvest._arguments import (
     far_from_origin,
     impossible_range,
     require_range,
+    warn_of_degrees,
 )
 from auvest._core import Convergence, Decision, Status
 from auvest._interrupts import first_slice, in_slices
@@ -571,6 +572,11 @@ class GaussianFilter:
         Interrupted
             After Ctrl-C, a ``KeyboardInterrupt`` within half a second: ``partial`` holds the
             results so far, and the filter stays at their last row; of many records the runs done.
+
+        Warns
+        -----
+        UserWarning
+            If an angle of ``input`` or ``z`` jumps from row to row as only degrees do.
         """
         as_flag("covariance", covariance)
         threads = as_workers(workers)
@@ -764,7 +770,20 @@ class GaussianFilter:
     ) -> tuple[dict[str, Any], list[Any]]:
         """Take the arguments of :meth:`run`: columns for the core, and its sensors."""
         handles, which = self._as_sensor_rows(sensor)
-        return self._as_columns(z, dt, input, handles, which, place, age_s, reference), handles
+        record = self._as_columns(z, dt, input, handles, which, place, age_s, reference)
+        self._look_for_degrees(record["z"], record["input"], sensor)
+        return record, handles
+
+    def _look_for_degrees(self, z: Floats, input: Floats | None, sensor: Any) -> None:
+        """Warn of what no record in radians holds; for methods that the user calls by one other."""
+        if input is not None:
+            warn_of_degrees("input", self._process.input, input, stacklevel=4)
+        used, which = self._sensors_used(sensor)
+        for k, one in enumerate(used):
+            model = next(iter(self._sensors.values())) if one is None else one
+            measures = (self._sensors[model] if isinstance(model, str) else model).measures
+            rows = z if which is None else z[which == k]
+            warn_of_degrees("z", measures, rows, stacklevel=4)
 
     def _as_columns(
         self,
@@ -1016,8 +1035,13 @@ class GaussianFilter:
         self, sensor: str | MeasurementModel | Sequence[str | MeasurementModel] | None
     ) -> tuple[list[Any], npt.NDArray[np.int32] | None]:
         """Give the core's sensors and, where there are several, which of them each row has."""
+        used, which = self._sensors_used(sensor)
+        return [self._handle(one) for one in used], which
+
+    def _sensors_used(self, sensor: Any) -> tuple[list[Any], npt.NDArray[np.int32] | None]:
+        """Give each name or model once and, where each row has one, which of them that is."""
         if sensor is None or isinstance(sensor, (str, MeasurementModel)):
-            return [self._handle(sensor)], None
+            return [sensor], None
         given = sensor if isinstance(sensor, (list, tuple)) else np.asarray(sensor).tolist()
         if not (
             given
@@ -1028,8 +1052,7 @@ class GaussianFilter:
         keys = [one if isinstance(one, str) else id(one) for one in given]
         used = dict(zip(keys, given, strict=True))
         index = {key: k for k, key in enumerate(used)}
-        handles = [self._handle(one) for one in used.values()]
-        return handles, np.array([index[key] for key in keys], np.int32)
+        return list(used.values()), np.array([index[key] for key in keys], np.int32)
 
     def _as_measurements(
         self, z: npt.ArrayLike, handles: list[Any], which: npt.NDArray[np.int32] | None

@@ -84,11 +84,13 @@ def run_many(
             except (ValueError, TypeError) as error:
                 raise type(error)(f"run {r}: {error}") from None
         raise
-    record = {
+    record: dict[str, Any] = {
         name: None if column is None else column.reshape(runs, rows, *column.shape[1:])
         for name, column in flat.items()
         if name != "sensor"
     }
+    driven = record["input"]
+    filter._look_for_degrees(record["z"][0], None if driven is None else driven[0], sensor)
     shared = {"sensor": None if which is None else which[np.newaxis]}
     columns = _columns(filter, record["z"], covariance=covariance)
     width = lanes()

@@ -135,6 +135,32 @@ class RunResult(Result):
     convergence: npt.NDArray[np.uint8]
     mixture_size: npt.NDArray[np.uint8]
 
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many rows had a measurement that was, by these names.
+
+        ``accepted``, ``downweighted`` or ``rejected`` (see :class:`auvest.Decision`), ``missing``
+        or ``too_late``; ``recovered`` are those of them at which the covariance was widened.
+        """
+        taken = self.iterations > 0
+        counts = {
+            name: int(np.count_nonzero(taken & (self.decision == int(decision))))
+            for name, decision in Decision.__members__.items()
+        }
+        late = int(np.count_nonzero(self.too_late)) if "too_late" in self.columns else 0
+        missing = self._rows_done() - int(np.count_nonzero(taken)) - late
+        recovered = int(np.count_nonzero(self.recovered))
+        return {**counts, "missing": missing, "too_late": late, "recovered": recovered}
+
+    def _rows_done(self) -> int:
+        return self.iterations.size
+
+    def _summary(self) -> str:
+        found = [
+            f"{count} {name.replace('_', ' ')}" for name, count in self.counts.items() if count
+        ]
+        return ", ".join([super()._summary(), *found])
+
 
 @dataclass(frozen=True, repr=False, eq=False)
 class RunsResult(RunResult):
@@ -154,6 +180,11 @@ class RunsResult(RunResult):
 
     rows: npt.NDArray[np.int64]
     status: npt.NDArray[np.uint8]
+
+    _length_of = "runs"
+
+    def _rows_done(self) -> int:
+        return int(self.rows.sum())
 
     @property
     def failed(self) -> npt.NDArray[np.bool_]:
