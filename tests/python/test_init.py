@@ -15,6 +15,7 @@ from auvest.cli import app
 from auvest.logs.guess import guess, table_of
 from auvest.logs.write import write_file
 from auvest.replay import Settings, read_settings
+from auvest.replay.checks import check
 from auvest.replay.first import first_settings
 from auvest.replay.schema import SCHEMA, text
 
@@ -118,6 +119,15 @@ def test_names_of_beacons_are_refused_where_they_stand(tmp_path: Path) -> None:
     (found,) = first_settings(tmp_path).checked.findings
     assert (found.file, found.line) == ("ranges.csv", 2)
     assert "column beacon: 'B1' is not a number; sources have numbers" in found.message
+
+
+def test_a_finding_names_the_file_that_was_taken(tmp_path: Path) -> None:
+    log = recorders(tmp_path)
+    settings = Settings(files=first_settings(log).files)
+    with (log / "dvl_export.csv").open("a") as file:
+        file.write("1764316861000;x;0;0\n")
+    (found,) = [one for one in check(log, settings).findings if one.cause == "unreadable"]
+    assert (found.file, found.line) == ("dvl_export.csv", 63)
 
 
 def test_units_by_name_and_by_size(tmp_path: Path) -> None:
