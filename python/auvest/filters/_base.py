@@ -769,16 +769,22 @@ class GaussianFilter:
         reference: npt.ArrayLike | None,
     ) -> tuple[dict[str, Any], list[Any]]:
         """Take the arguments of :meth:`run`: columns for the core, and its sensors."""
-        handles, which = self._as_sensor_rows(sensor)
+        used, which = self._sensors_used(sensor)
+        handles = [self._handle(one) for one in used]
         record = self._as_columns(z, dt, input, handles, which, place, age_s, reference)
-        self._look_for_degrees(record["z"], record["input"], sensor)
+        self._look_for_degrees(record["z"], record["input"], used, which)
         return record, handles
 
-    def _look_for_degrees(self, z: Floats, input: Floats | None, sensor: Any) -> None:
+    def _look_for_degrees(
+        self,
+        z: Floats,
+        input: Floats | None,
+        used: list[Any],
+        which: npt.NDArray[np.int32] | None,
+    ) -> None:
         """Warn of what no record in radians holds; for methods that the user calls by one other."""
         if input is not None:
             warn_of_degrees("input", self._process.input, input, stacklevel=4)
-        used, which = self._sensors_used(sensor)
         for k, one in enumerate(used):
             model = next(iter(self._sensors.values())) if one is None else one
             measures = (self._sensors[model] if isinstance(model, str) else model).measures
@@ -1031,14 +1037,9 @@ class GaussianFilter:
                 f"{type(model).__name__} has no {model.lacks}: an Ekf needs it; use Ukf or Ckf"
             )
 
-    def _as_sensor_rows(
+    def _sensors_used(
         self, sensor: str | MeasurementModel | Sequence[str | MeasurementModel] | None
     ) -> tuple[list[Any], npt.NDArray[np.int32] | None]:
-        """Give the core's sensors and, where there are several, which of them each row has."""
-        used, which = self._sensors_used(sensor)
-        return [self._handle(one) for one in used], which
-
-    def _sensors_used(self, sensor: Any) -> tuple[list[Any], npt.NDArray[np.int32] | None]:
         """Give each name or model once and, where each row has one, which of them that is."""
         if sensor is None or isinstance(sensor, (str, MeasurementModel)):
             return [sensor], None

@@ -57,7 +57,8 @@ def run_many(
     # name: how many axes the argument of one run has
     axes = {"dt": 1, "input": 2, "place": 2, "age_s": 1, "reference": 2}
     given = {"dt": dt, "input": input, "place": place, "age_s": age_s, "reference": reference}
-    handles, which = filter._as_sensor_rows(sensor)
+    used, which = filter._sensors_used(sensor)
+    handles = [filter._handle(one) for one in used]
     if which is not None and len(which) != rows:
         raise ValueError(
             f"sensor has {len(which)} rows and each run of z has {rows}; they must have the same"
@@ -90,7 +91,7 @@ def run_many(
         if name != "sensor"
     }
     driven = record["input"]
-    filter._look_for_degrees(record["z"][0], None if driven is None else driven[0], sensor)
+    filter._look_for_degrees(record["z"][0], None if driven is None else driven[0], used, which)
     shared = {"sensor": None if which is None else which[np.newaxis]}
     columns = _columns(filter, record["z"], covariance=covariance)
     width = lanes()

@@ -190,10 +190,8 @@ def _is_log_file(path: Path, name: str) -> bool:
         return False
     if "time" not in seen.header:
         return True
-    k = seen.header.index("time")
-    return not _numbers(
-        [row[k] for row in seen.rows], seen.decimal
-    )  # in seconds it has another name
+    k = seen.header.index("time")  # seconds have another name in a log
+    return not _numbers([row[k] for row in seen.rows], seen.decimal)
 
 
 def _columns(seen: Table) -> dict[str, tuple[str, str]]:
