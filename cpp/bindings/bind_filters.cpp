@@ -77,6 +77,7 @@ int update(FilterHandle<Scalar>& handle, const py::object& z, const SensorHandle
   if (!age.is_none() && (!plain::take(age, elapsed) || !(elapsed >= Scalar(0)))) {
     return kUnclear;
   }
+  if (place.is_none() && !sensor->stands && !missing) return kUnclear;
   if (missing) {
     handle.report = desk::Report<Scalar>();
     handle.status = Status::kOk;
@@ -457,6 +458,7 @@ void bind_precision(py::module_& m) {
       .def_readonly("size", &Sensor::size)
       .def_readonly("place", &Sensor::place)
       .def_readwrite("description", &Sensor::description)
+      .def_readwrite("stands", &Sensor::stands)
       .def(
           "h",
           [](const Sensor& sensor, const Array<Scalar>& x) {

@@ -49,6 +49,7 @@ struct AnySensor {
   const int states;
   const int size;
   const int place;          ///< numbers that say where it stood or how it was headed; 0: none
+  bool stands = true;       ///< whether an update may come without them
   std::string description;  ///< how its owner would make it again
 
   AnySensor(int n, int m, int p) : states(n), size(m), place(p) {}

@@ -78,6 +78,16 @@ def pair(default: Any) -> Any:
     return taken(as_pair("default", default), as_pair)
 
 
+def unstated(entry: Any) -> Any:
+    """Take what another field takes, or None, which is the default: not stated."""
+    take, schema = entry.metadata["take"], entry.metadata["schema"]
+
+    def take_or_none(name: str, given: object) -> Any:
+        return None if given is None else take(name, given)
+
+    return taken(None, take_or_none, **schema)
+
+
 def instance(of: type) -> Any:
     """Take an instance of a class; default: one with its defaults."""
     return field(default_factory=of, metadata={"take": partial(as_instance, expected=of)})

@@ -46,9 +46,20 @@ def variants(model: type[Any]) -> Iterator[Any]:
         yield model(**dict(zip(choices, values, strict=True)))
 
 
+#: Where a sensor stands that has to be told.
+STANDS = {"leader": (0.0, 0.0), "heading_rad": 0.0}
+
+
+def standing(model: auvest.MeasurementModel) -> auvest.MeasurementModel:
+    """A sensor that says where it stands."""
+    if model.stands:
+        return model
+    return dataclasses.replace(model, **{model.place: STANDS[model.place]})  # type: ignore[type-var]
+
+
 #: Every sensor in every size.
 ALL_SENSORS: tuple[auvest.MeasurementModel, ...] = (
-    *itertools.chain.from_iterable(map(variants, SENSORS.values())),
+    *map(standing, itertools.chain.from_iterable(map(variants, SENSORS.values()))),
     auvest.Position(covariance_m2=[[1.0, 0.3, 0.1], [0.3, 2.0, -0.2], [0.1, -0.2, 0.5]]),
 )
 

@@ -281,6 +281,53 @@ def test_a_place_is_that_of_a_model_that_stands_there(kind, name, dtype):
         assert readable(a) != readable(c)
 
 
+#: Sensors that have no place which goes without saying, with a process.
+NOWHERE = {
+    "LeaderRange": (auvest.LeaderRange(), "SpeedHeading", (3.0, 4.0)),
+    "ScaledRange": (auvest.ScaledRange(), "OdometryConstants", (3.0, 4.0)),
+    "BodyVelocity": (auvest.BodyVelocity(axes=2), "WhiteAcceleration2", 0.3),
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("case", NOWHERE)
+def test_a_measurement_from_nowhere_is_refused(kind, case):
+    model, name, stated = NOWHERE[case]
+    process = ALL[name]
+    standing = dataclasses.replace(model, **{model.place: stated})
+    z = standing.h(start(process)[0])
+    f, twin = (make(kind, name, sensors={"it": model, "there": standing}) for _ in range(2))
+    before = everything(f)
+    lost = f"place.* must be given, for {type(model).__name__} was made without {model.place}"
+    driven = None if not process.input else np.zeros((4, len(process.input)))
+    where = np.tile(np.ravel(stated), (4, 1)).astype(float)
+    where[2] = NAN
+    rows = np.tile(z, (4, 1))
+    for given in (z, z.tolist(), np.float32(z)):
+        with pytest.raises(ValueError, match=lost):
+            f.update(given, "it")
+    with pytest.raises(ValueError, match=lost):
+        f.run(rows, dt=1.0, input=driven, sensor="it")
+    for call in (f.run, f.smooth):
+        with pytest.raises(ValueError, match=r"^place\[2\] must be given"):
+            call(rows, dt=1.0, input=driven, sensor=["it", "there", "it", "there"], place=where)
+    with pytest.raises(ValueError, match=r"^run 0: place\[2\] must be given"):
+        f.run(np.stack([rows, rows]), dt=1.0, input=driven, sensor="it", place=where)
+    with pytest.raises(ValueError, match=f"^{model.place} must be given"):
+        model.h(start(process)[0])
+    assert everything(f) == before
+
+    # What is missing comes from nowhere, and what the row or another sensor says is somewhere.
+    f.update(None, "it")
+    f.update(np.full(len(z), NAN), "it")
+    f.update(z, "it", place=stated)
+    twin.update(z, "there")
+    rows[2] = NAN
+    sensors = ["it", "there", "it", "it"]
+    result = f.run(rows, dt=1.0, input=driven, sensor=sensors, place=where)
+    require_same(result, twin.run(rows, dt=1.0, input=driven, sensor="there"))
+
+
 @pytest.mark.parametrize(("kind", "name", "dtype"), PRECISE_CASES)
 def test_a_record_may_be_split_and_go_without_covariances(kind, name, dtype):
     rows = record(ALL[name])

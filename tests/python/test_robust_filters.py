@@ -288,7 +288,7 @@ CALLS = {
         r"z has shape \(4, 2\), expected \(T, 1\)",
     ),
     "run motion": (
-        lambda f: f.run(np.ones(4), dt=1.0, input=np.tile(MOTION, (3, 1))),
+        lambda f: f.run(np.ones(4), dt=1.0, input=np.tile(MOTION, (3, 1)), place=np.ones((4, 2))),
         ValueError,
         "input has 3 rows and z has 4",
     ),
@@ -341,7 +341,7 @@ def test_rejections_of_what_does_not_see_the_position_do_not_widen_it(kind, dtyp
         [40.0, 30.0, 0.4, 0.3],
         p0,
         process=auvest.WhiteAcceleration(),
-        sensors=auvest.BodyVelocity(),
+        sensors=auvest.BodyVelocity(heading_rad=0.0),
         recovery=auvest.RejectionStreak(rejections=2),
         dtype=dtype,
     )

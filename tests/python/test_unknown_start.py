@@ -201,10 +201,14 @@ def test_a_refused_call_changes_nothing(steps):
     for call in (
         lambda: f.predict(4000.0, [1.0, 0.0, 0.0]),
         lambda: f.predict(5.0, [big, 0.0, 0.0]),
-        lambda: f.update(-1.0),
-        lambda: f.update(big),
+        lambda: f.update(-1.0, place=(0.0, 0.0)),
+        lambda: f.update(big, place=(0.0, 0.0)),
         lambda: f.update(50.0, place=(1e9, 0.0)),
-        lambda: f.update(50.0, age_s=9.9) if steps == 0 else f.update(-1.0, age_s=5.0),
+        lambda: (
+            f.update(50.0, place=(0.0, 0.0), age_s=9.9)
+            if steps == 0
+            else f.update(-1.0, place=(0.0, 0.0), age_s=5.0)
+        ),
     ):
         with pytest.raises(FilterError):
             call()
@@ -305,7 +309,7 @@ def test_moments_of_components_that_are_nearly_singular_are_a_covariance():
             process=auvest.ConstantAcceleration(
                 position_psd=0, velocity_psd=0, acceleration_psd=10 ** rng.uniform(-8, 0)
             ),
-            sensors=auvest.LeaderRange(),
+            sensors=auvest.LeaderRange(leader=(0.0, 0.0)),
             components=8,
             alpha=(1e-3, 0.5, 1.0)[seed % 3],
             dtype="float32",
@@ -451,7 +455,7 @@ def test_a_replay_finds_its_start_and_says_when(tmp_path):
     assert result.numbers["settled_rmse_m"] < 1.0
     assert result.numbers["rmse_m"] > 10.0
     said = dict(rows(result))
-    assert said["start"].startswith("settled first at ")
+    assert said["unknown start"].startswith("settled first at ")
     table = parquet.read_table(tmp_path / "estimates.parquet")
     assert table.column_names[-2:] == ["convergence", "mixture_size"]
     first, *_, last = table.to_pylist()

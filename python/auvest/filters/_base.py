@@ -446,7 +446,7 @@ class GaussianFilter:
             has several.
         place : array_like, optional
             What ``sensor.place`` names, then: where the station or the leader stood, m, how the
-            instrument was headed, rad; default: as the model has it.
+            instrument was headed, rad; default: as the model has it, if it does.
         age_s : float, optional
             How long ago it was measured, s, at most ``late_s``; default: now.
 
@@ -466,6 +466,8 @@ class GaussianFilter:
         if code == _core.UNCLEAR:
             given = np.atleast_1d(z) if handle.size == 1 and np.ndim(z) == 0 else z  # type: ignore[arg-type]
             row = as_array("z", given, (handle.size,), self._dtype, missing=True)
+            if place is None and not np.isnan(row).any():
+                self._named_sensor(sensor)[1].require_standing("place")
             there = None if place is None else self._as_place(place, handle)
             age = 0.0 if age_s is None else as_number("age_s", age_s, "not negative")
             code = self._filter.update(row, handle, there, age)
@@ -544,7 +546,7 @@ class GaussianFilter:
             needed where the filter has several.
         place : array_like, shape (T, p), optional
             What ``sensor.place`` names, at each row: where the station or the leader stood, m, how
-            the instrument was headed, rad; a NaN row, and default: as the model has it.
+            the instrument was headed, rad; a NaN row, and default: as the model has it, if it does.
         age_s : float or array_like, shape (T,), optional
             How long before each row its measurement was taken, s. One older than ``late_s`` is left
             out and marked in the column ``too_late``.
@@ -771,7 +773,7 @@ class GaussianFilter:
         """Take the arguments of :meth:`run`: columns for the core, and its sensors."""
         used, which = self._sensors_used(sensor)
         handles = [self._handle(one) for one in used]
-        record = self._as_columns(z, dt, input, handles, which, place, age_s, reference)
+        record = self._as_columns(z, dt, input, used, which, place, age_s, reference)
         self._look_for_degrees(record["z"], record["input"], used, which)
         return record, handles
 
@@ -786,23 +788,22 @@ class GaussianFilter:
         if input is not None:
             warn_of_degrees("input", self._process.input, input, stacklevel=4)
         for k, one in enumerate(used):
-            model = next(iter(self._sensors.values())) if one is None else one
-            measures = (self._sensors[model] if isinstance(model, str) else model).measures
             rows = z if which is None else z[which == k]
-            warn_of_degrees("z", measures, rows, stacklevel=4)
+            warn_of_degrees("z", self._named_sensor(one)[1].measures, rows, stacklevel=4)
 
     def _as_columns(
         self,
         z: npt.ArrayLike,
         dt: npt.ArrayLike | None,
         input: npt.ArrayLike | None,
-        handles: list[Any],
+        used: list[Any],
         which: npt.NDArray[np.int32] | None,
         place: npt.ArrayLike | None,
         age_s: npt.ArrayLike | None,
         reference: npt.ArrayLike | None,
     ) -> dict[str, Any]:
         """Take those of them that have a row per measurement of these sensors."""
+        handles = [self._handle(one) for one in used]
         rows = self._as_measurements(z, handles, which)
         count = len(rows)
         if which is not None and len(which) != count:
@@ -817,13 +818,15 @@ class GaussianFilter:
                 _require_rows("reference", track, count)
         elif reference is not None:
             raise TypeError("reference must be None: this filter has no interval policy")
+        places = self._as_places(place, handles, which, count)
+        self._require_standing(rows, places, used, which)
         return {
             "z": rows,
             "dt": np.full(count, np.nan, self._dtype)
             if dt is None
             else as_steps(dt, count, self._dtype),
             "input": self._as_inputs(input, count),
-            "place": self._as_places(place, handles, which, count),
+            "place": places,
             "age_s": self._as_ages(age_s, count),
             "reference": track,
             "sensor": which,
@@ -1133,6 +1136,25 @@ class GaussianFilter:
         places = np.full((count, _core.MAX_PLACE), np.nan, self._dtype)
         places[:, : given.shape[1]] = given
         return places
+
+    def _require_standing(
+        self,
+        z: Floats,
+        places: Floats | None,
+        used: list[Any],
+        which: npt.NDArray[np.int32] | None,
+    ) -> None:
+        """Refuse measurements of which neither the record nor the model says from where."""
+        for k, one in enumerate(used):
+            model = self._named_sensor(one)[1]
+            if not model.stands:
+                lost = ~np.isnan(z[:, 0])
+                if which is not None:
+                    lost &= which == k
+                if places is not None:
+                    lost &= np.isnan(places[:, 0])
+                if lost.any():
+                    model.require_standing(f"place[{int(np.argmax(lost))}]")
 
     def _as_ages(self, age_s: npt.ArrayLike | None, count: int) -> Floats | None:
         if age_s is None:

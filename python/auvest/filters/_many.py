@@ -74,14 +74,14 @@ def run_many(
     try:
         flat = filter._as_columns(
             stack.reshape(runs * rows, -1),
-            handles=handles,
+            used=used,
             which=None if which is None else np.tile(which, runs),
             **{name: _flat(given[name], runs, name in own) for name in given},
         )
     except (ValueError, TypeError):
         for r in range(runs):
             try:
-                filter._as_columns(stack[r], handles=handles, which=which, **of_run(r))
+                filter._as_columns(stack[r], used=used, which=which, **of_run(r))
             except (ValueError, TypeError) as error:
                 raise type(error)(f"run {r}: {error}") from None
         raise

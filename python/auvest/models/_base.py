@@ -170,7 +170,33 @@ class MeasurementModel(Model):
     observes: ClassVar[tuple[str, ...]] = ("x_m", "y_m")
     measures: tuple[str, ...] = ()
     place: ClassVar[str | None] = None
+    #: What `place` names where the model does not say; it is never measured from there.
+    _elsewhere: ClassVar[Any] = None
     _squares = True
+
+    @property
+    def stands(self) -> bool:
+        """Whether a measurement needs no ``place``: the model has it, or has no use for one."""
+        return self.place is None or getattr(self, self.place) is not None
+
+    def require_standing(self, argument: str) -> None:
+        """Refuse a measurement that comes without a place where the model has none, either.
+
+        Raises
+        ------
+        ValueError
+            Which names ``argument``.
+        """
+        if not self.stands:
+            raise ValueError(
+                f"{argument} must be given, for {type(self).__name__} was made without {self.place}"
+            )
+
+    def _stood(self) -> Any:
+        """Give what `place` names."""
+        if self.place is None:
+            return None
+        return getattr(self, self.place) if self.stands else self._elsewhere
 
     def _core_defaults(self) -> dict[str, float]:
         return _core.sensor_defaults(self.core_name)
@@ -202,9 +228,10 @@ class MeasurementModel(Model):
             except _core.StatusError as error:
                 if error.status != Status.far_from_origin or self.place is None:
                     raise
-                place = np.array(getattr(self, self.place))
+                place = np.array(self._stood())
                 raise ValueError(far_from_origin(self.place, place, dtype)) from None
             sensor.description = saved_as(self)
+            sensor.stands = self.stands
             return sensor
 
         return self._handle((states, dtype.name), make)
@@ -224,8 +251,10 @@ class MeasurementModel(Model):
         Raises
         ------
         ValueError
-            If a shape is wrong, or a state so large that its measurement is not finite.
+            If a shape is wrong, a state so large that its measurement is not finite, or the model
+            does not say where it stands.
         """
+        self.require_standing(str(self.place))
         least = len(self.observes)
         shape = np.shape(x)
         if len(shape) not in (1, 2) or shape[-1] < least:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from auvest import _core
-from auvest._fields import integer, number, positive
+from auvest._fields import integer, number, positive, unstated
 from auvest.models._base import MeasurementModel
 
 _DEFAULTS = _core.sensor_defaults("BodyVelocity3")
@@ -24,7 +24,8 @@ class BodyVelocity(MeasurementModel):
     axes : {2, 3}
         In the plane or in space.
     heading_rad : float
-        From +x towards +y, when it was measured; ``place`` in ``update`` and ``run`` replaces it.
+        From +x towards +y, when it was measured; where it is left out, ``place`` says so in
+        ``update`` and ``run``.
     sigma_forward_m_s, sigma_sideways_m_s, sigma_vertical_m_s : float
         Standard deviations, m/s, positive. An error of the heading turns the velocity: add it,
         times the speed, in squares to ``sigma_sideways_m_s``.
@@ -37,9 +38,10 @@ class BodyVelocity(MeasurementModel):
 
     structural = ("axes",)
     place = "heading_rad"
+    _elsewhere = _DEFAULTS["heading_rad"]
 
     axes: Literal[2, 3] = integer(2, 2, 3)
-    heading_rad: float = number(_DEFAULTS["heading_rad"])
+    heading_rad: float | None = unstated(number(_elsewhere))
     sigma_forward_m_s: float = positive(_DEFAULTS["sigma_forward_m_s"])
     sigma_sideways_m_s: float = positive(_DEFAULTS["sigma_sideways_m_s"])
     sigma_vertical_m_s: float = positive(_DEFAULTS["sigma_vertical_m_s"])
@@ -54,6 +56,9 @@ class BodyVelocity(MeasurementModel):
     def measures(self) -> tuple[str, ...]:  # type: ignore[override]
         """In the vehicle's axes."""
         return ("forward_m_s", "sideways_m_s", "vertical_m_s")[: self.axes]
+
+    def _core_params(self) -> dict[str, float]:
+        return {**super()._core_params(), "heading_rad": self._stood()}
 
     @property
     def core_name(self) -> str:

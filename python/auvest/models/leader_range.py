@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from auvest import _core
 from auvest._arguments import require_range_limits
-from auvest._fields import not_negative, number, pair, positive
+from auvest._fields import not_negative, number, pair, positive, unstated
 from auvest.models._base import MeasurementModel
 
 _DEFAULTS = _core.sensor_defaults("LeaderRange")
@@ -19,7 +19,8 @@ class LeaderRange(MeasurementModel):
     Parameters
     ----------
     leader : (float, float)
-        Where the leader was when the range was taken, m from a local origin.
+        Where the leader was when the range was taken, m from a local origin; where it is left out,
+        ``place`` says so in ``update`` and ``run``.
     sigma_range_m : float
         Standard deviation of the range, positive.
     sigma_leader_m : float
@@ -38,8 +39,9 @@ class LeaderRange(MeasurementModel):
 
     measures = ("range_m",)
     place = "leader"
+    _elsewhere = (_DEFAULTS["leader_x_m"], _DEFAULTS["leader_y_m"])
 
-    leader: tuple[float, float] = pair((_DEFAULTS["leader_x_m"], _DEFAULTS["leader_y_m"]))
+    leader: tuple[float, float] | None = unstated(pair(_elsewhere))
     sigma_range_m: float = positive(_DEFAULTS["sigma_range_m"])
     sigma_leader_m: float = not_negative(_DEFAULTS["sigma_leader_m"])
     smallest_range_m: float = number(_DEFAULTS["smallest_range_m"])
@@ -51,5 +53,6 @@ class LeaderRange(MeasurementModel):
 
     def _core_params(self) -> dict[str, float]:
         params = super()._core_params()
-        params["leader_x_m"], params["leader_y_m"] = params.pop("leader")  # type: ignore[misc]
+        params["leader_x_m"], params["leader_y_m"] = self._stood()
+        del params["leader"]
         return params
