@@ -1,6 +1,6 @@
 """Figures: one style, colours that colour-blind readers can tell apart, units on every axis.
 
-For runs of your own: :func:`nees` and :func:`nis`, with their bounds.
+For runs of your own: :func:`run` shows one, :func:`nees` and :func:`nis` have their bounds.
 
 The functions return :class:`matplotlib.figure.Figure` objects and never touch pyplot or the global
 style, so they can be used in any program and thread; :func:`save` writes one as a PNG.
@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -23,7 +23,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from auvest import metrics
+from auvest._arguments import as_array
+from auvest._core import Decision
 from auvest._outputs import new_file
+
+if TYPE_CHECKING:
+    from auvest.filters.results import RunResult
 
 Floats = npt.NDArray[np.float64]
 
@@ -414,6 +419,121 @@ def slave_figure(
     style(plane, legend=8, xlabel="x / m", ylabel="y / m")
     style(axes, legend=8, xlabel="time / s", ylabel="position error / m", ylim=(0, None))
     return figure
+
+
+def run(
+    result: RunResult,
+    *,
+    truth: npt.ArrayLike | None = None,
+    places: npt.ArrayLike | None = None,
+    time_s: npt.ArrayLike | None = None,
+    title: str = "",
+) -> Figure:
+    """Draw what a filter's ``run`` or ``smooth`` gave: the track, and how far it is to be believed.
+
+    Parameters
+    ----------
+    result : RunResult or SmoothResult, T rows
+        Of a filter whose state begins with x and y, m.
+    truth : array_like, shape (T, 2), optional
+        Where the craft was, m; NaN where nobody knows. With it, beside the track stand the errors
+        along x and y in the filter's +-3 sigma; without, the first number of each innovation in
+        its own, and the NIS.
+    places : array_like, shape (K, 2), optional
+        Beacons and stations, m.
+    time_s : array_like, shape (T,), optional
+        Time of each row, s; default: the rows are counted.
+    title : str
+        Above the figure.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Crosses on the track are rows whose measurement was rejected. Bands need covariances
+        (``covariance=True``).
+
+    Raises
+    ------
+    ValueError
+        If the shapes do not fit.
+
+    Examples
+    --------
+    >>> import auvest, numpy as np
+    >>> from auvest import plots
+    >>> beacon = auvest.LeaderRange(leader=(20.0, 0.0))
+    >>> ekf = auvest.Ekf([0, 0], np.eye(2), process=auvest.SpeedHeading(), sensors=beacon)
+    >>> result = ekf.run([19.2, 18.1], dt=1.0, input=[[1.0, 0.0, 0.0]] * 2)
+    >>> figure = plots.run(result, truth=[[1, 0], [2, 0]], places=[beacon.leader])
+    >>> [axes.get_ylabel() for axes in figure.axes]
+    ['y / m', 'x error / m', 'y error / m']
+    """
+    rows, states = np.shape(result.x)
+    if states < 2:
+        raise ValueError(f"result has {states} state, but a track has x and y")
+    float64 = np.dtype(np.float64)
+    time = (
+        np.arange(1.0, rows + 1) if time_s is None else as_array("time_s", time_s, (rows,), float64)
+    )
+    figure = new_figure((11.0, 5.0), title)
+    grid = figure.add_gridspec(2, 2, width_ratios=(1.0, 1.25))
+    plane = figure.add_subplot(grid[:, 0])
+    upper = figure.add_subplot(grid[0, 1])
+    lower = figure.add_subplot(grid[1, 1], sharex=upper)
+    upper.tick_params(labelbottom=False)
+    if truth is not None:
+        known = as_array("truth", truth, (rows, 2), float64, missing=True)
+        plane.plot(*known.T, "-", color=BLACK, label="truth")
+    plane.plot(*result.x[:, :2].T, "-", color=BLUE, linewidth=1.2, label="estimate")
+    if "smoothed_x" in result.columns:
+        smoothed = result["smoothed_x"][:, :2]
+        plane.plot(*smoothed.T, "--", color=ORANGE, linewidth=1.2, label="smoothed")
+    draw_rejected(plane, result.x[result.decision == int(Decision.rejected), :2])
+    if places is not None:
+        there = as_array("places", places, (None, 2), float64)
+        plane.plot(*there.T, "^", color=BLACK, linestyle="none", label="places")
+    style_plane(plane)
+    plane.legend(fontsize=8.5, framealpha=0.85, edgecolor="none")
+    if truth is None:
+        S = result["S"] if "S" in result.columns else None
+        sigma = None if S is None else np.sqrt(S[:, 0, 0])
+        draw_band(upper, time, result.innovation[:, 0], sigma, BLUE, "innovation", ".")
+        style(upper, legend=8.5, ylabel="innovation, first number")
+        lower.plot(time, result.nis, ".", color=BLUE, markersize=3)
+        style(lower, ylabel="NIS", ylim=(0.0, None))
+    else:
+        for k, axes in enumerate((upper, lower)):
+            sigma = np.sqrt(result.P[:, k, k]) if "P" in result.columns else None
+            draw_band(axes, time, result.x[:, k] - known[:, k], sigma, BLUE, "error", "-")
+            style(axes, ylabel=f"{'xy'[k]} error / m")
+        upper.legend(fontsize=8.5, framealpha=0.85, edgecolor="none")
+    lower.set_xlabel("row" if time_s is None else "time / s")
+    return figure
+
+
+def draw_band(
+    axes: Axes,
+    time_s: npt.NDArray[Any],
+    value: npt.NDArray[Any],
+    sigma: npt.NDArray[Any] | None,
+    colour: str,
+    label: str,
+    marks: str,
+) -> None:
+    """Draw what ought to be 0, and the +-3 sigma that the filter claims of it."""
+    if sigma is not None:
+        known = np.isfinite(sigma)
+        axes.fill_between(
+            time_s[known], -3 * sigma[known], 3 * sigma[known], color=colour, alpha=0.18,
+            linewidth=0, label="±3 sigma of the filter",
+        )  # fmt: skip
+    axes.plot(time_s, value, marks, color=colour, linewidth=1.0, markersize=3, label=label)
+
+
+def draw_rejected(axes: Axes, positions: npt.NDArray[Any]) -> None:
+    """Mark the positions at which measurements were rejected, if there are some."""
+    if len(positions):
+        axes.plot(*positions.T, "x", color=VERMILION, markersize=5, label="measurement rejected")
 
 
 def nees(

@@ -20,7 +20,7 @@ from auvest.importers.sets import IMPORTERS
 from auvest.logs import LogError, LogFolder, reader
 from auvest.logs.findings import CAUSES, worst
 from auvest.logs.write import write_file
-from auvest.replay import Settings, find_settings, replay, settings_from
+from auvest.replay import Settings, diagnosis, find_settings, replay, settings_from
 from auvest.replay.checks import Checked, check, files
 from auvest.replay.health import RECOVERIES_NOT_TRUSTED, Residuals, health, truncated_moments
 from auvest.replay.health import findings as health_findings
@@ -245,6 +245,11 @@ def test_replay_says_the_same_and_warns(tmp_path: Path) -> None:
     ]
     assert by_text[0] == by_text[1]
     assert all({"cause", "file", "line", "message"} <= set(one) for one in told["findings"])
+    for command, options in {"check": [], "replay": ["--output", out]}.items():
+        strict = CliRunner().invoke(app, [command, *arguments, *options, "--strict"])
+        assert strict.exit_code == 1
+        assert strict.stderr.endswith("--strict: log is not trusted\n")
+        assert json.loads(strict.stdout)["command"] == command
     report = (tmp_path / "out" / "log" / "report.html").read_text(encoding="utf-8")
     assert '<span class="verdict not_trusted">not trusted</span>' in report
 
@@ -312,6 +317,17 @@ def test_recoveries_again_and_again_are_not_trusted(tmp_path: Path) -> None:
     (told,) = [one for one in checked.findings if one.cause == "recoveries"]
     assert told.verdict == checked.verdict == "not_trusted"
     assert "range_scale" in measure.causes(checked)
+
+
+def test_a_unit_of_speed_is_named(tmp_path: Path) -> None:
+    """1852 m an hour are 0.514 m/s; what is 5 % off is a scale, and no unit."""
+    settings = measure.trial("knots", "beacons", 3, tmp_path)
+    told = {found.cause: found.text for found in check(tmp_path, settings).findings}
+    factor, unit = re.findall(r"times ([0-9.]+): are they in (.+)\?", told["speed_scale"])[0]
+    assert (float(factor), unit) == (pytest.approx(1852 / 3600, rel=0.03), "knots")
+    log = LogFolder(tmp_path)
+    assert "are they" not in diagnosis._speeds(log, 0.49).message
+    assert "feet" in diagnosis._speeds(log, 0.3).message
 
 
 def test_a_source_that_stands_apart_is_named(tmp_path: Path) -> None:
@@ -439,6 +455,8 @@ def test_command_shows_one_screen_and_refuses_what_is_no_folder(tmp_path: Path) 
     assert shown.exit_code == 0
     assert shown.stdout.count("\n") <= 24
     assert "verdict     sound" in shown.stdout
+    strict = CliRunner().invoke(app, ["check", "--strict", str(tmp_path / "arc")])
+    assert (strict.exit_code, strict.stdout) == (0, shown.stdout)
     refused = CliRunner().invoke(app, ["check", str(tmp_path / "nowhere")])
     assert refused.exit_code == 2
     assert "is not a folder" in refused.stderr

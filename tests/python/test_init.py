@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 
 from auvest.cli import app
 from auvest.logs.guess import guess, table_of
+from auvest.logs.layout import FILES, SPELLINGS, WHAT
 from auvest.logs.write import write_file
 from auvest.replay import Settings, read_settings
 from auvest.replay.checks import check
@@ -211,3 +212,27 @@ def test_settings_beside_a_log_are_not_overlooked_in_silence(tmp_path: Path, com
 
 def test_the_command_prints_the_schema() -> None:
     assert call("init", "--schema").stdout == text()
+
+
+@pytest.mark.parametrize("command", ["init", "check", "replay"])
+def test_layout_shows_every_file_and_column_of_a_log(command: str) -> None:
+    """What it shows of each file is taken as the header of one."""
+    shown = CliRunner().invoke(app, [command, "--layout"])
+    assert (shown.exit_code, shown.stderr) == (0, "")
+    name, seen = "", dict.fromkeys(FILES, 0)
+    for line in shown.stdout.split("Other names")[0].splitlines():
+        if (file := line[:17].strip()) in FILES:
+            name = file
+            assert line[18:] == WHAT[file]
+        elif name and line:
+            layout = FILES[name][seen[name]]
+            required, _, optional = line[5:].rstrip("]").partition("[,")
+            assert required.split(",") == [column.name for column in layout.required]
+            assert [one for one in optional.split(",") if one] == [
+                column.name for column in layout.optional
+            ]
+            seen[name] += 1
+    assert seen == {file: len(layouts) for file, layouts in FILES.items()}
+    assert list(WHAT) == list(FILES)
+    for names, others in SPELLINGS.items():
+        assert f"  {','.join(names):14} {','.join(others[0])}" in shown.stdout

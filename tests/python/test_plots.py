@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import auvest
 from auvest import metrics, plots
 from auvest.registry import replayable
 
@@ -62,6 +63,74 @@ def test_nis_of_one_run_with_gaps() -> None:
 def test_shapes_that_do_not_fit_are_refused(call: Any, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         call()
+
+
+def curve(axes: Any, label: str) -> tuple[list[float], list[float]]:
+    (line,) = [one for one in axes.get_lines() if one.get_label() == label]
+    return line.get_xdata().tolist(), line.get_ydata().tolist()
+
+
+def test_a_run_is_drawn_with_what_it_claims() -> None:
+    """Ranges of 10 m too much at rows 3 and 7; the rest is what the filter expects."""
+    beacon = auvest.LeaderRange(leader=(50.0, 0.0), sigma_range_m=1.0)
+    truth = np.column_stack([np.arange(1.0, 11.0), np.zeros(10)])
+    z = 50.0 - truth[:, 0]
+    z[[2, 6]] += 10.0
+    inputs = np.tile([1.0, 0.0, 0.0], (10, 1))
+
+    def robust() -> auvest.RobustEkf:
+        return auvest.RobustEkf(
+            [0.0, 0.0], np.eye(2), process=auvest.SpeedHeading(), sensors=beacon, kernel="hampel"
+        )
+
+    result = robust().run(z, dt=1.0, input=inputs)
+    assert result.counts["rejected"] == 2
+    figure = plots.run(result, truth=truth, places=[(50, 0)], title="a run", time_s=2 * truth[:, 0])
+    plane, x, y = figure.axes
+    assert figure.get_suptitle() == "a run"
+    assert curve(plane, "truth") == (truth[:, 0].tolist(), [0.0] * 10)
+    assert curve(plane, "estimate") == (result.x[:, 0].tolist(), result.x[:, 1].tolist())
+    assert curve(plane, "measurement rejected")[0] == result.x[[2, 6], 0].tolist()
+    assert curve(plane, "places") == ([50.0], [0.0])
+    for k, axes in enumerate((x, y)):
+        time, error = curve(axes, "error")
+        assert time == (2 * truth[:, 0]).tolist()
+        assert error == (result.x[:, k] - truth[:, k]).tolist()
+        (band,) = axes.collections
+        highest = 3 * np.sqrt(result.P[:, k, k].max())
+        assert band.get_datalim(axes.transData).ymax == pytest.approx(highest, rel=1e-12)
+    assert y.get_xlabel() == "time / s"
+
+    # Without a truth: innovations and the NIS. Without covariances: no band.
+    plane, innovation, nis = plots.run(result).axes
+    assert curve(innovation, "innovation") == (list(range(1, 11)), result.innovation[:, 0].tolist())
+    (band,) = innovation.collections
+    highest = 3 * np.sqrt(result.S.max())
+    assert band.get_datalim(innovation.transData).ymax == pytest.approx(highest, rel=1e-12)
+    assert nis.get_lines()[0].get_ydata().tolist() == result.nis.tolist()
+    assert nis.get_xlabel() == "row"
+    lean = robust().run(z, dt=1.0, input=inputs, covariance=False)
+    for given in (None, truth):
+        assert not any(axes.collections for axes in plots.run(lean, truth=given).axes)
+    smoothed = robust().smooth(z, dt=1.0, input=inputs)
+    assert curve(plots.run(smoothed).axes[0], "smoothed")[0] == smoothed.smoothed_x[:, 0].tolist()
+
+
+def test_a_run_that_has_no_track_and_a_truth_of_another_length_are_refused() -> None:
+    depth = auvest.FunctionProcess(lambda x, _dt: x, np.eye(1), state=("z_m",))
+    sensor = auvest.FunctionSensor(lambda x: x, np.eye(1))
+    one = auvest.Ukf([0.0], np.eye(1), process=depth, sensors=sensor).run([1.0, 2.0], dt=1.0)
+    with pytest.raises(ValueError, match="result has 1 state, but a track has x and y"):
+        plots.run(one)
+    still = auvest.Position()
+    fixes = auvest.Ekf([0, 0], np.eye(2), process=auvest.SpeedHeading(), sensors=still)
+    two = fixes.run([[0, 0], [1, 0]], dt=1.0, input=np.zeros((2, 3)))
+    with pytest.raises(ValueError, match=r"truth has shape \(3, 2\), expected \(2, 2\)"):
+        plots.run(two, truth=np.zeros((3, 2)))
+    with pytest.raises(ValueError, match=r"places has shape \(2,\), expected"):
+        plots.run(two, places=(1.0, 2.0))
+    with pytest.raises(ValueError, match=r"time_s has shape \(3,\), expected \(2,\)"):
+        plots.run(two, time_s=[1, 2, 3])
 
 
 def test_across_and_along_are_those_of_a_circle() -> None:

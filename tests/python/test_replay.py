@@ -39,7 +39,15 @@ from auvest.logs import FILES, LogError, LogFolder, reader
 from auvest.logs.layout import SPELLINGS
 from auvest.logs.write import write_file
 from auvest.models import ConstantAcceleration
-from auvest.replay import Settings, engine, find_settings, read_settings, replay, settings_from
+from auvest.replay import (
+    Settings,
+    engine,
+    find_settings,
+    read_settings,
+    replay,
+    report,
+    settings_from,
+)
 from auvest.replay.config import packaged_settings
 from auvest.replay.engine import Localiser, Tracker
 from auvest.replay.tables import ERRORS, ESTIMATES, MEASUREMENTS, Batch
@@ -608,6 +616,7 @@ def test_a_run_must_start_somewhere(tmp_path: Path) -> None:
     write_file(tmp_path, "truth.csv", time_s=[2.0], x_m=[3.0], y_m=[4.0], heading_rad=[0.5])
     begun = Localiser(LogFolder(tmp_path), Settings(), "ekf")
     assert begun.start == (2.0, 3.0, 4.0, 0.5)
+    assert replay(LogFolder(tmp_path), Settings()).document()["started_from"] == "truth.csv"
     (tmp_path / "start.csv").write_text("time_s,x_m,y_m,heading_rad\n")
     with pytest.raises(LogError, match="no line below the header"):
         Localiser(LogFolder(tmp_path), Settings(), "ekf")
@@ -643,6 +652,19 @@ def test_a_tracker_starts_at_the_first_fix_and_learns_the_velocity(tmp_path: Pat
     # The truth is asked for 0.1 s after each fix: the prediction goes on with the velocity.
     errors = tables["errors"]
     assert abs(errors["error_x_m"][-1]) < 0.01
+
+
+@pytest.mark.parametrize(
+    ("start_s", "file", "said"),
+    [(0.0, "start.csv", "start.csv, first line"), (None, None, "the first place that is measured")],
+)
+def test_a_result_says_where_its_start_is_from(
+    tmp_path: Path, start_s: float | None, file: str | None, said: str
+) -> None:
+    far_fixes(tmp_path, [0j, 1j], [4.0, 5.0], start_s=start_s)
+    result = replay(LogFolder(tmp_path), Settings())
+    assert result.document()["started_from"] == file
+    assert dict(report.rows(result))["start"] == said
 
 
 def far_fixes(

@@ -44,8 +44,8 @@ def samples(names: tuple[str, ...], rows: int, **columns: list[Any]) -> Samples:
 
 def measured(result: Result, **columns: list[Any]) -> Result:
     rows = len(next(iter(columns.values())))
-    made = samples(tables.MEASUREMENTS, rows, **columns)
-    doubted = Samples(tables.MEASUREMENTS)
+    names = (*tables.MEASUREMENTS, *tables.SHOWN)
+    made, doubted = samples(names, rows, **columns), Samples(names)
     full = made.columns()
     away = np.isin(full["outcome"], (tables.DOWNWEIGHTED, tables.REJECTED))
     doubted.add({name: values[away] for name, values in full.items()})
@@ -102,6 +102,26 @@ def test_innovations_near_the_station_are_not_drawn(result: Result) -> None:
     assert along.get_yscale() == "linear"
 
 
+def test_where_a_measurement_was_rejected_is_on_the_track(result: Result) -> None:
+    filled = measured(
+        result,
+        x_m=[1.0, 2.0, 3.0],
+        y_m=[-1.0, -2.0, -3.0],
+        outcome=[tables.REJECTED, tables.DOWNWEIGHTED, tables.ACCEPTED],
+    )
+    assert curve(figures.overview(filled).axes[0], "measurement rejected") == ([1.0], [-1.0])
+    labels = [line.get_label() for line in figures.overview(result).axes[0].get_lines()]
+    assert "measurement rejected" not in labels
+
+
+def test_the_title_has_the_verdict_and_the_error(result: Result) -> None:
+    figure = figures.overview(replace(result, name="one", numbers=NUMBERS))
+    assert figure.get_suptitle() == "one, ukf: sound, RMSE 0.123 m, of dead reckoning 2.25 m"
+    unknown = {**NUMBERS, "rmse_m": None, "dead_reckoned_rmse_m": None}
+    figure = figures.overview(replace(result, name="one", numbers=unknown))
+    assert figure.get_suptitle() == "one, ukf: sound"
+
+
 def test_gross_errors_do_not_flatten_the_rest(result: Result) -> None:
     """The axis is logarithmic beyond four bounds of three sigma, if something is beyond eight."""
     columns = {"sigma_0": [1.0] * 4}
@@ -124,6 +144,7 @@ NUMBERS: dict[str, Any] = {
     "after_end": 6,
     "no_position": 7,
     "too_short": 3,
+    "started_from": "truth.csv",
     "recovered": 8,
     "near_field": 9,
     "rmse_m": 0.12345,
@@ -151,6 +172,7 @@ def test_figures_in_words(result: Result) -> None:
         "downweighted": "2",
         "rejected": "3",
         "held out": "4",
+        "start": "truth.csv, first line: no start.csv says it",
         "recoveries from lock-out": "8",
         "taken as positions (near field)": "9",
         "late lines put in order": "6",

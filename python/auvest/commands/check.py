@@ -1,9 +1,10 @@
 """``auvest check``: what a log holds, and what may be wrong with it, before it is used.
 
-A LOG is a folder of CSV files, as docs/logs.md describes it. Its files are read for rates, gaps,
-units and clocks; then it is replayed, and what the measurements leave is judged: a compass from
-another axis, x and y exchanged, a latency, a slant range, a scale, a source that stands apart. Each
-mistake is undone in turn, and the one that makes the measurements likelier by far is named.
+A LOG is a folder of CSV files; --layout shows which, docs/logs.md has more. They are read for
+rates, gaps, units and clocks; then it is replayed, and what the measurements leave is judged: a
+compass from another axis, x and y exchanged, a latency, a slant range, a scale, speeds in knots, a
+source that stands apart. Each mistake is undone in turn, and the one that makes the measurements
+likelier by far is named.
 
 The verdict is sound, doubtful or not_trusted. A truth, if there is one, is not looked at. The words
 for causes are those of docs/logs.md. The settings matter: with sigmas that are ten times too small
@@ -12,6 +13,8 @@ no log is sound.
 Examples
 --------
   auvest check logs/goats14 --config goats14
+
+  auvest check my_log --strict --quiet && auvest replay my_log
 
   auvest check my_log --json | jq '.logs[].findings[] | .cause, .file, .line, .message'
 """
@@ -33,6 +36,8 @@ def command(
     filter_name: log_options.Filter = None,
     config: log_options.Config = None,
     changes: log_options.Set = None,
+    strict: log_options.Strict = False,
+    layout: log_options.Layout = False,  # noqa: ARG001 (shown when it is read)
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -43,7 +48,7 @@ def command(
         settings = log_options.settings_of(config, changes)
         for path in logs:
             if not path.is_dir():
-                raise ValueError(f"LOG: {path} is not a folder (docs/logs.md)")
+                raise ValueError(f"LOG: {path} is not a folder (see --layout)")
         checked = [check(path, settings, filter_name) for path in logs]
     terminal.result_json(
         {
@@ -58,6 +63,8 @@ def command(
     )
     for one in checked:
         _show(terminal, one)
+    if strict:
+        log_options.require_sound(terminal, ((one.name, one.verdict) for one in checked))
 
 
 def _show(terminal: Terminal, one: Checked) -> None:

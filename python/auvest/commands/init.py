@@ -1,6 +1,6 @@
 """``auvest init``: a first settings file for a folder of recordings.
 
-LOG is a folder of CSV files: a log as docs/logs.md describes it, or what recorders left. Files and
+LOG is a folder of CSV files: a log as --layout shows it, or what recorders left. Files and
 columns with other names, units or separators are guessed by their names and numbers. The log is
 then checked as 'auvest check' does it, and LOG/auvest.toml written: what is which, noises and gaps
 as far as they show, and the findings as comments. Read it before you trust it.
@@ -37,6 +37,7 @@ def command(
         bool, typer.Option("--schema", help="Print the JSON Schema of settings, and nothing else.")
     ] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace LOG/auvest.toml.")] = False,
+    layout: log_options.Layout = False,  # noqa: ARG001 (shown when it is read)
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -47,7 +48,7 @@ def command(
         return
     with terminal.usage_errors():
         if log is None or not log.is_dir():
-            raise ValueError(f"LOG: {log} is not a folder (docs/logs.md)")
+            raise ValueError(f"LOG: {log} is not a folder (see --layout)")
         path = log / "auvest.toml"
         if path.exists() and not force:
             raise ValueError(f"{path} is there already; --force replaces it")

@@ -10,7 +10,9 @@ import typer
 
 from auvest.commands import options
 from auvest.commands.console import Terminal
-from auvest.logs.findings import Finding
+from auvest.commands.exit_codes import ExitCode
+from auvest.logs.findings import Finding, Verdict
+from auvest.logs.layout import FILES, SPELLINGS, WHAT
 from auvest.replay import Settings, find_settings
 from auvest.replay.config import FilterName, KernelName, packaged_settings
 
@@ -52,6 +54,41 @@ KernelOption = Annotated[
     ),
 ]
 
+
+def _show_layout(wanted: bool) -> None:
+    if not wanted:
+        return
+    lines = [
+        "A log is a folder of these files, CSV with a header. Columns in [] may be missing.",
+        "",
+    ]
+    for name, layouts in FILES.items():
+        lines.append(f"{name:17} {WHAT[name]}")
+        lines += [f"  {'or' if k else '':2} {layout}" for k, layout in enumerate(layouts)]
+    lines += ["", "Other names of columns, which say what they are:"]
+    for names, others in SPELLINGS.items():
+        lines.append(f"  {','.join(names):14} {' or '.join(','.join(one) for one in others)}")
+    lines += [
+        "",
+        "Angles count from +x towards +y; compass_rad and azimuth_rad clockwise from north.",
+        "A craft that localises itself has odometry.csv, and ranges, fixes or positions; one that",
+        "is tracked has fixes or positions alone; one that hears masters odometry.csv, echoes.csv.",
+        "'auvest init' reads files of other names, units and separators.",
+    ]
+    Terminal(as_json=False, quiet=False).result("\n".join(lines))
+    raise typer.Exit
+
+
+Layout = Annotated[
+    bool,
+    typer.Option(
+        "--layout",
+        help="Show the files and columns of a log, and stop.",
+        is_eager=True,
+        callback=_show_layout,
+    ),
+]
+
 Smooth = Annotated[
     bool, typer.Option("--smooth", help="Go back over each log with what came later.")
 ]
@@ -65,6 +102,16 @@ Lag = Annotated[
         show_default="everything that came later",
     ),
 ]
+Strict = Annotated[
+    bool, typer.Option("--strict", help="Exit with 1 unless the verdict on each log is sound.")
+]
+
+
+def require_sound(terminal: Terminal, verdicts: Iterable[tuple[str, Verdict]]) -> None:
+    """End with 1 if a log's verdict is another: what --strict asks for."""
+    other = [f"{log} is {v.replace('_', ' ')}" for log, v in verdicts if v != "sound"]
+    if other:
+        terminal.fail(f"--strict: {'; '.join(other)}", ExitCode.FAILED)
 
 
 def require_smooth(*, smooth: bool, lag_s: float | None) -> None:

@@ -1,7 +1,7 @@
 """``auvest replay``: recorded runs through a filter, with tables, a figure and a report of each.
 
-A LOG is a folder of CSV files, as docs/logs.md describes it and 'auvest import' makes it. For each
-the output folder gets a folder with the estimates, measurements and errors as Parquet, the track as
+A LOG is a folder of CSV files, as --layout shows it and 'auvest import' makes it. For each the
+output folder gets a folder with the estimates, measurements and errors as Parquet, the track as
 TUM text, a figure, one self-contained HTML report and results.json. --write says which of them,
 --format csv how tables are written; --every 1 writes one estimate a second. A log of echoes also
 gets the masters that were tracked.
@@ -79,8 +79,10 @@ def command(
     write: Write = _ALL,
     kind: Format = "parquet",
     every_s: Every = 0.0,
+    strict: log_options.Strict = False,
     output: options.Output = Path("auvest-output/replay"),
     force: options.Force = False,
+    layout: log_options.Layout = False,  # noqa: ARG001 (shown when it is read)
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -142,6 +144,8 @@ def command(
             f"interrupted in {results[-1].name}: what was done is written to {output}",
             ExitCode.INTERRUPTED,
         )
+    if strict:
+        log_options.require_sound(terminal, ((one.name, one.health.verdict) for one in results))
 
 
 def _write(folder: Path, result: Result, wanted: list[str]) -> None:
@@ -166,6 +170,8 @@ def _show(
 
     title = f"{result.name}, {result.filter_name}"
     terminal.result(table(title, ("quantity", "value"), report.rows(result), right={1}))
+    if "figure" in wanted:
+        terminal.result(f"figure    {shown(folder / 'figure.png')}")
     if "report" in wanted:
         terminal.result(f"report    {shown(folder / 'report.html')}")
     made = [name for name in TABLES if any((folder / f"{name}.{one}").exists() for one in formats)]

@@ -51,6 +51,7 @@ CAUSES: Mapping[str, tuple[str, Verdict]] = {
     "slant_range": ("ranges are slant: source and craft differ in depth", "doubtful"),
     "latency": ("measurements carry the time of their arrival", "doubtful"),
     "range_scale": ("ranges are too long or too short by a factor", "doubtful"),
+    "speed_scale": ("speeds or distances are in another unit, or off by a factor", "doubtful"),
     "source_off": ("one source fits no track that the others fit", "doubtful"),
     "noise_too_small": ("standard deviations in the settings are too small", "doubtful"),
     "recoveries": ("the filter lost its track again and again", "not_trusted"),

@@ -175,6 +175,27 @@ FILES: Mapping[str, tuple[Layout, ...]] = {
     "origin.csv": (_layout("latitude_deg,longitude_deg"),),
 }
 
+#: What is in each, for those who make a log.
+WHAT: Mapping[str, str] = {
+    "odometry.csv": "how the craft moved: increments since the line before, or velocities",
+    "compass.csv": "how it was headed, where that has a rate of its own",
+    "ranges.csv": "ranges to sources, by number",
+    "fixes.csv": "range and bearing of the craft from a station",
+    "positions.csv": "where it was: GPS, USBL",
+    "echoes.csv": "range and bearing of masters, as the craft's sonar hears them",
+    "masters.csv": "what is told of a master, and from when on",
+    "plans.csv": "accelerations that masters have announced",
+    "velocities.csv": "velocity over ground and heading that a tracked craft tells",
+    "depth.csv": "how deep it was: ranges are then slant",
+    "water.csv": "the water, for the speed of sound",
+    "beacons.csv": "sources that stand; no times",
+    "leaders.csv": "sources that move",
+    "start.csv": "one line: where the run starts",
+    "truth.csv": "where it really was: only to score",
+    "master_truth.csv": "where masters really were: only to score",
+    "origin.csv": "one line: where on Earth (0, 0) is",
+}
+
 #: Other columns that can stand in the place of one, or of two: what they are is in their names.
 SPELLINGS: Mapping[tuple[str, ...], tuple[tuple[str, ...], ...]] = {
     ("time_s",): (("time",),),

@@ -42,6 +42,10 @@ TIE_SHARE, TIE = 0.05, 6.0
 LATENCIES_S = (0.5, 2.0, 8.0)
 DEPTHS_M = (8.0, 24.0, 72.0)
 SCALES = (0.9, 0.96, 1.04, 1.1)
+#: Metres, or metres per second, in what a speed or a distance may have been told in.
+SPEED_UNITS = {"knots": 1852 / 3600, "feet": 0.3048, "km/h": 1 / 3.6}
+#: A scale so near to that of a unit, as a share, is taken for it.
+NEAR_UNIT = 0.05
 NOISES = (3.0, 10.0)
 FINER = 3
 
@@ -291,6 +295,8 @@ def _families(log: LogFolder, rows: Columns, *, gross: bool) -> Iterator[list[Hy
         yield list(_headings(log, mirrored=False))
         yield list(_degrees(log))
         yield list(_noises())
+    if not tracking:
+        yield Number(partial(_speeds, log), (*SPEED_UNITS.values(), *SCALES))
     if not tracking and "positions.csv" in log:
         yield _latency("positions", {"positions.csv"})
     if not any(name in log for name in names):  # absolute positions alone
@@ -407,6 +413,18 @@ def _turning(log: LogFolder, compute: Callable[[Rows], Rows]) -> dict[str, Chang
     turns = ("turn_rad", "yaw_rate_rad_s", "heading_rad")
     at = next(k for k, name in enumerate(names) if name in turns)
     return {file: columns_changed({at: lambda rows: compute(rows[:, at])})}
+
+
+def _speeds(log: LogFolder, scale: float) -> Hypothesis:
+    """Speeds or distances of another scale."""
+    moved = ("forward_m", "left_m", "speed_m_s", "left_m_s")
+    at = [k for k, name in enumerate(log["odometry.csv"].names) if name in moved]
+    changes = columns_changed({k: lambda rows, k=k: scale * rows[:, k] for k in at})  # type: ignore[misc]
+    units = [unit for unit, size in SPEED_UNITS.items() if abs(scale / size - 1) < NEAR_UNIT]
+    message = f"it fits with speeds and distances times {scale:.3f}" + "".join(
+        f": are they in {unit}?" for unit in units
+    )
+    return Hypothesis("speed_scale", {"odometry.csv": changes}, message)
 
 
 def _noises() -> Iterator[Hypothesis]:

@@ -121,6 +121,8 @@ class Replay(ABC):
             for name in dict.fromkeys(names)
             if name in log
         }
+        #: The file whose first line the run starts at; empty: at the first place that is measured.
+        self.started_from = ""
         self.start = self._start()
         self._waiting = {
             name: np.empty((0, len(stream.table.columns))) for name, stream in self.streams.items()
@@ -243,6 +245,7 @@ class Replay(ABC):
         rows, _ = next(table.chunks(), (np.empty((0, 4)), 0))
         if len(rows) == 0:
             raise LogError(table.path, "has no line below the header")
+        self.started_from = name
         time, x, y = rows[0, :3].tolist()
         return time, x, y
 
@@ -882,7 +885,7 @@ def _places(sensor: MeasurementModel) -> int:
     """Say how many numbers the place of a sensor has."""
     if sensor.place is None:
         return 0
-    place = getattr(sensor, sensor.place)
+    place = sensor._stood()
     return len(place) if isinstance(place, tuple) else 1
 
 

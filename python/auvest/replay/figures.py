@@ -17,7 +17,7 @@ Floats = npt.NDArray[np.float64]
 
 def overview(result: Result) -> Figure:
     """Draw tracks, and beside them the error or, without a truth, the innovations."""
-    figure = plots.new_figure((11.0, 5.0), f"{result.name}, {result.filter_name}")
+    figure = plots.new_figure((11.0, 5.0), _title(result))
     grid = figure.add_gridspec(2, 2, width_ratios=(1.0, 1.25))
     _tracks(figure.add_subplot(grid[:, 0]), result)
     upper, lower = figure.add_subplot(grid[0, 1]), figure.add_subplot(grid[1, 1])
@@ -28,6 +28,16 @@ def overview(result: Result) -> Figure:
         _nis(lower, result)
         lower.set_xlabel("time / s")
     return figure
+
+
+def _title(result: Result) -> str:
+    parts = [f"{result.name}, {result.filter_name}: {result.health.verdict.replace('_', ' ')}"]
+    error, reckoned = (result.numbers[name] for name in ("rmse_m", "dead_reckoned_rmse_m"))
+    if error is not None:
+        parts.append(f"RMSE {error:.3g} m")
+    if reckoned is not None:
+        parts.append(f"of dead reckoning {reckoned:.3g} m")
+    return ", ".join(parts)
 
 
 def _tracks(axes: Axes, result: Result) -> None:
@@ -43,6 +53,9 @@ def _tracks(axes: Axes, result: Result) -> None:
     if "smoothed_x_m" in estimate:
         smoothed = estimate["smoothed_x_m"], estimate["smoothed_y_m"]
         axes.plot(*smoothed, "--", color=plots.ORANGE, linewidth=1.2, label="smoothed")
+    doubted = result.outliers.columns()
+    away = doubted["outcome"] == tables.REJECTED
+    plots.draw_rejected(axes, np.column_stack([doubted["x_m"], doubted["y_m"]])[away])
     if len(result.sources):
         axes.plot(*result.sources.T, "^", color=plots.BLACK, linestyle="none", label="beacons")
     plots.style_plane(axes)
@@ -52,13 +65,8 @@ def _tracks(axes: Axes, result: Result) -> None:
 def _errors(pair: tuple[Axes, Axes], result: Result) -> None:
     rows, colour = result.errors.columns(), plots.FILTER_COLOURS[result.filter_name]
     for axes, name in zip(pair, "xy", strict=True):
-        bound = 3 * rows[f"sigma_{name}_m"]
-        axes.fill_between(
-            rows["time_s"], -bound, bound, color=colour, alpha=0.18, linewidth=0,
-            label="±3 sigma of the filter",
-        )  # fmt: skip
-        axes.plot(rows["time_s"], rows[f"error_{name}_m"], color=colour, linewidth=1.0,
-                  label="error")  # fmt: skip
+        error, sigma = rows[f"error_{name}_m"], rows[f"sigma_{name}_m"]
+        plots.draw_band(axes, rows["time_s"], error, sigma, colour, "error", "-")
         if f"smoothed_error_{name}_m" in rows:
             axes.plot(
                 rows["time_s"], rows[f"smoothed_error_{name}_m"], "--", color=plots.ORANGE,
@@ -82,19 +90,15 @@ def _innovation(axes: Axes, result: Result, m: int) -> None:
     known = ~np.isnan(rows[f"innovation_{m}"]) & (rows["near_field"] == 0)
     ranged = ~np.isin(rows["sensor"], ("position", "velocity", "depth"))
     known &= ranged if ranged.any() else rows["sensor"] == "position"
-    time, bound = rows["time_s"][known], 3 * rows[f"sigma_{m}"][known]
-    value = rows[f"innovation_{m}"][known]
-    order = np.argsort(time, kind="stable")
-    axes.fill_between(
-        time[order], -bound[order], bound[order], color=colour, alpha=0.18, linewidth=0,
-        label="±3 sigma",
-    )  # fmt: skip
-    axes.plot(time, value, ".", color=colour, markersize=3, label="innovation")
+    at = np.flatnonzero(known)
+    at = at[np.argsort(rows["time_s"][at], kind="stable")]
+    value, sigma = rows[f"innovation_{m}"][at], rows[f"sigma_{m}"][at]
+    plots.draw_band(axes, rows["time_s"][at], value, sigma, colour, "innovation", ".")
     away = doubted["outcome"] == tables.REJECTED
     if away.any():
         rejected = doubted["time_s"][away], doubted[f"innovation_{m}"][away]
         axes.plot(*rejected, "x", color=colour, markersize=5, label=tables.REJECTED)
-    _compress(axes, value, 4 * float(np.quantile(bound, 0.9)) if len(bound) else 1.0)
+    _compress(axes, value, 12 * float(np.quantile(sigma, 0.9)) if len(at) else 1.0)
     names = ("range / m", "bearing / rad") if ranged.any() else ("x / m", "y / m")
     plots.style(axes, ylabel=names[m])
     _legend(axes)

@@ -145,7 +145,8 @@ def rows(result: Result) -> list[tuple[str, str]]:
         ("time", f"{n['first_s']:.1f} to {n['last_s']:.1f} s"),
         ("measurements", f"{n['measurements']}"),
         *((outcome, f"{n[outcome.replace(' ', '_')]}") for outcome in tables.OUTCOMES[:4]),
-        ("start", _start(n)),
+        ("start", _started(n)),
+        ("unknown start", _convergence(n)),
         ("recoveries from lock-out", f"{n['recovered']}"),
         ("taken as positions (near field)", f"{n['near_field']}"),
         ("late lines put in order", f"{sum(f['reordered'] for f in n['late'].values())}"),
@@ -166,7 +167,14 @@ def rows(result: Result) -> list[tuple[str, str]]:
     return [(name, text) for name, text in made if text]
 
 
-def _start(numbers: dict[str, Any]) -> str:
+def _started(numbers: dict[str, Any]) -> str:
+    file = numbers["started_from"]
+    if file is None:
+        return "the first place that is measured"
+    return f"{file}, first line" + (": no start.csv says it" if file == "truth.csv" else "")
+
+
+def _convergence(numbers: dict[str, Any]) -> str:
     if "convergence" not in numbers:
         return ""
     if numbers["settled_s"] is None:

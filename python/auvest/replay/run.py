@@ -219,6 +219,7 @@ def replay(
         numbers["masters"] = tally.masters()
     if isinstance(engine, Localiser):
         numbers["constants"] = [one.document() for one in engine.constants]
+    numbers["started_from"] = engine.started_from or None
     numbers["origin_m"] = None if origin is None else list(origin)
     earth = log.frame.origin
     numbers["origin_deg"] = None if earth is None else list(earth)

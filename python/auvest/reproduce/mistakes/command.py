@@ -1,6 +1,6 @@
 """``auvest reproduce mistakes``: the usual mistakes in simulated logs, and what 'check' says.
 
-Twenty-three mistakes (units, clocks, axes, compass, latency, depth, codes for 'no echo', separators
+Twenty-four mistakes (units, clocks, axes, compass, latency, depth, codes for 'no echo', separators
 ...) are put into clean simulated trials of three kinds, and it is counted how often the right cause
 is named; clean trials, and the recordings if there are any, must raise no alarm. Writes a page
 README.md and results.json.

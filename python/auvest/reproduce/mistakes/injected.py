@@ -111,6 +111,13 @@ def _scaled(files: Files, _random: np.random.Generator) -> None:
     measured["range_m"] = 1.07 * measured["range_m"]
 
 
+def _knots(files: Files, _random: np.random.Generator) -> None:
+    odometry = files["odometry.csv"]
+    for name in ("forward_m", "left_m", "speed_m_s", "left_m_s"):
+        if name in odometry:
+            odometry[name] = odometry[name] * 3600 / 1852
+
+
 def _code(value: float) -> Callable[[Files, np.random.Generator], None]:
     def spoil(files: Files, random: np.random.Generator) -> None:
         measured = _measured(files)
@@ -179,6 +186,7 @@ MISTAKES: Mapping[str, Mistake] = {
     "slant": Mistake("slant_range", "60 m of depth between craft and sources", ALL, _slant),
     "latency": Mistake("latency", "ranges stamped 3 s late", RANGING, _late),
     "scale": Mistake("range_scale", "ranges 7 % too long", ALL, _scaled),
+    "knots": Mistake("speed_scale", "speeds in knots", RANGING, _knots),
     "no echo 0": Mistake("no_echo", "0 where no echo came", ALL, _code(0.0)),
     "no echo 65.535": Mistake("no_echo", "65.535 where no echo came", ALL, _code(65.535)),
     "no echo 9999": Mistake("no_echo", "9999 where no echo came", ALL, _code(9999.0)),
