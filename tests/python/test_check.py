@@ -326,7 +326,7 @@ def test_a_unit_of_speed_is_named(tmp_path: Path) -> None:
     factor, unit = re.findall(r"times ([0-9.]+): are they in (.+)\?", told["speed_scale"])[0]
     assert (float(factor), unit) == (pytest.approx(1852 / 3600, rel=0.03), "knots")
     log = LogFolder(tmp_path)
-    assert "are they" not in diagnosis._speeds(log, 0.49).message
+    assert "are they" not in diagnosis._speeds(log, 0.48).message
     assert "feet" in diagnosis._speeds(log, 0.3).message
 
 
