@@ -160,7 +160,7 @@ def rows(result: Result) -> list[tuple[str, str]]:
         *_masters(n),
         *((f"constant {one['name']}", Found(**one).text) for one in n.get("constants", ())),
         ("held-out measurements, RMSE", _metres(n["held_out_rmse_m"])),
-        ("NIS, mean", _nis(n)),
+        ("NIS, mean, rejected ones too", _nis(n)),
         ("NIS within three sigma, mean", _nis_within(health)),
         ("measurements beyond three sigma", _share(health.beyond_share)),
     ]
