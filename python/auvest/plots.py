@@ -520,13 +520,21 @@ def draw_band(
     label: str,
     marks: str,
 ) -> None:
-    """Draw what ought to be 0, and the +-3 sigma that the filter claims of it."""
+    """Draw what ought to be 0, and the +-3 sigma that the filter claims of it.
+
+    A start that is known badly does not flatten the rest.
+    """
     if sigma is not None:
         known = np.isfinite(sigma)
         axes.fill_between(
             time_s[known], -3 * sigma[known], 3 * sigma[known], color=colour, alpha=0.18,
             linewidth=0, label="±3 sigma of the filter",
         )  # fmt: skip
+        if known.any():
+            usual = 3 * float(np.quantile(sigma[known], 0.9))
+            reach = max(usual, float(np.nanmax(np.abs(value), initial=0.0)))
+            if 3 * sigma[known].max() > 2 * reach > 0:
+                axes.set_ylim(-1.2 * reach, 1.2 * reach)
     axes.plot(time_s, value, marks, color=colour, linewidth=1.0, markersize=3, label=label)
 
 

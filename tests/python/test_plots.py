@@ -116,6 +116,25 @@ def test_a_run_is_drawn_with_what_it_claims() -> None:
     assert curve(plots.run(smoothed).axes[0], "smoothed")[0] == smoothed.smoothed_x[:, 0].tolist()
 
 
+def test_a_start_that_is_known_badly_does_not_flatten_the_rest() -> None:
+    beacon = auvest.LeaderRange(leader=(50.0, 0.0))
+    truth = np.zeros((40, 2))
+    for start_m, told in ((1.0, False), (100.0, True)):
+        f = auvest.Ekf(
+            [0, 0],
+            np.diag([start_m**2, 1.0]),
+            process=auvest.SpeedHeading(sigma_forward=0.1),
+            sensors=beacon,
+        )
+        z = np.full(40, 50.5)
+        z[:2] = np.nan  # until the third row it knows no more than at the start
+        result = f.run(z, dt=1.0, input=np.zeros((40, 3)))
+        x = plots.run(result, truth=truth).axes[1]
+        (band,) = x.collections
+        assert (x.get_ylim()[1] < 0.1 * band.get_datalim(x.transData).ymax) == told
+        assert x.get_ylim()[1] > np.abs(result.x[:, 0]).max()
+
+
 def test_a_run_that_has_no_track_and_a_truth_of_another_length_are_refused() -> None:
     depth = auvest.FunctionProcess(lambda x, _dt: x, np.eye(1), state=("z_m",))
     sensor = auvest.FunctionSensor(lambda x: x, np.eye(1))
