@@ -23,7 +23,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from auvest import metrics
-from auvest._arguments import as_array
+from auvest._arguments import as_array, as_instance, as_real
 from auvest._core import Decision
 from auvest._outputs import new_file
 
@@ -88,6 +88,12 @@ KERNEL_COLOURS: Mapping[str, str] = {
     "huber": ORANGE,
     "hampel": BROWN,
 }
+#: Errors of a filter and of what came back over its record: begin of the names of columns, and how
+#: they are drawn.
+ERRORS = (
+    ("", BLUE, "error", "-", "±3 sigma of the filter"),
+    ("smoothed_", ORANGE, "smoothed: error", "--", "smoothed: ±3 sigma"),
+)
 _CYCLE = (BLUE, VERMILION, GREEN, ORANGE, SKY, GREY)
 
 
@@ -437,8 +443,8 @@ def run(
         Of a filter whose state begins with x and y, m.
     truth : array_like, shape (T, 2), optional
         Where the craft was, m; NaN where nobody knows. With it, beside the track stand the errors
-        along x and y in the filter's +-3 sigma; without, the first number of each innovation in
-        its own, and the NIS.
+        along x and y in the +-3 sigma that are claimed of them, of the smoothed track too; without,
+        the first number of each innovation in its own, and the NIS.
     places : array_like, shape (K, 2), optional
         Beacons and stations, m.
     time_s : array_like, shape (T,), optional
@@ -454,8 +460,8 @@ def run(
 
     Raises
     ------
-    ValueError
-        If the shapes do not fit.
+    ValueError, TypeError
+        If the shapes do not fit, or it is no result of one run.
 
     Examples
     --------
@@ -468,7 +474,12 @@ def run(
     >>> [axes.get_ylabel() for axes in figure.axes]
     ['y / m', 'x error / m', 'y error / m']
     """
-    rows, states = np.shape(result.x)
+    from auvest.filters.results import RunResult, RunsResult  # they draw nothing by themselves
+
+    as_instance("result", result, RunResult)
+    if isinstance(result, RunsResult):
+        raise TypeError("result is that of many runs: draw one of them, result.run(0)")
+    rows, states = result.x.shape
     if states < 2:
         raise ValueError(f"result has {states} state, but a track has x and y")
     float64 = np.dtype(np.float64)
@@ -482,14 +493,18 @@ def run(
     lower = figure.add_subplot(grid[1, 1], sharex=upper)
     upper.tick_params(labelbottom=False)
     if truth is not None:
-        known = as_array("truth", truth, (rows, 2), float64, missing=True)
+        given = as_real("truth", truth, (rows, 2))
+        unknown = np.isnan(given).any(axis=-1, keepdims=True)
+        known = as_array(
+            "truth", np.where(unknown, np.nan, given), (rows, 2), float64, missing=True
+        )
         plane.plot(*known.T, "-", color=BLACK, label="truth")
     plane.plot(*result.x[:, :2].T, "-", color=BLUE, linewidth=1.2, label="estimate")
     if "smoothed_x" in result.columns:
         smoothed = result["smoothed_x"][:, :2]
         plane.plot(*smoothed.T, "--", color=ORANGE, linewidth=1.2, label="smoothed")
     draw_rejected(plane, result.x[result.decision == int(Decision.rejected), :2])
-    if places is not None:
+    if places is not None and np.size(places) > 0:
         there = as_array("places", places, (None, 2), float64)
         plane.plot(*there.T, "^", color=BLACK, linestyle="none", label="places")
     style_plane(plane)
@@ -497,14 +512,26 @@ def run(
     if truth is None:
         S = result["S"] if "S" in result.columns else None
         sigma = None if S is None else np.sqrt(S[:, 0, 0])
-        draw_band(upper, time, result.innovation[:, 0], sigma, BLUE, "innovation", ".")
+        innovation = result.innovation[:, 0]
+        draw_band(upper, time, innovation, sigma, BLUE, "innovation", ".")
+        compress(upper, innovation, 4 * _usual(innovation if sigma is None else 3 * sigma))
         style(upper, legend=8.5, ylabel="innovation, first number")
         lower.plot(time, result.nis, ".", color=BLUE, markersize=3)
+        compress(lower, result.nis, 2 * metrics.chi2_bounds(result.innovation.shape[1])[1])
         style(lower, ylabel="NIS", ylim=(0.0, None))
     else:
         for k, axes in enumerate((upper, lower)):
-            sigma = np.sqrt(result.P[:, k, k]) if "P" in result.columns else None
-            draw_band(axes, time, result.x[:, k] - known[:, k], sigma, BLUE, "error", "-")
+            claimed: list[npt.NDArray[Any]] = [np.zeros(0)]
+            errors: list[npt.NDArray[Any]] = []
+            for prefix, *looks in ERRORS:
+                if f"{prefix}x" in result.columns:
+                    P = result[f"{prefix}P"] if f"{prefix}P" in result.columns else None
+                    sigma = None if P is None else np.sqrt(P[:, k, k])
+                    error = result[f"{prefix}x"][:, k] - known[:, k]
+                    draw_band(axes, time, error, sigma, *looks)
+                    claimed += [] if sigma is None else [3 * sigma]
+                    errors.append(error)
+            focus(axes, np.concatenate(claimed), np.concatenate(errors))
             style(axes, ylabel=f"{'xy'[k]} error / m")
         upper.legend(fontsize=8.5, framealpha=0.85, edgecolor="none")
     lower.set_xlabel("row" if time_s is None else "time / s")
@@ -518,24 +545,38 @@ def draw_band(
     sigma: npt.NDArray[Any] | None,
     colour: str,
     label: str,
-    marks: str,
+    marks: str = "-",
+    band: str = "±3 sigma of the filter",
 ) -> None:
-    """Draw what ought to be 0, and the +-3 sigma that the filter claims of it.
-
-    A start that is known badly does not flatten the rest.
-    """
+    """Draw what ought to be 0, and the +-3 sigma that are claimed of it."""
     if sigma is not None:
         known = np.isfinite(sigma)
         axes.fill_between(
             time_s[known], -3 * sigma[known], 3 * sigma[known], color=colour, alpha=0.18,
-            linewidth=0, label="±3 sigma of the filter",
+            linewidth=0, label=band,
         )  # fmt: skip
-        if known.any():
-            usual = 3 * float(np.quantile(sigma[known], 0.9))
-            reach = max(usual, float(np.nanmax(np.abs(value), initial=0.0)))
-            if 3 * sigma[known].max() > 2 * reach > 0:
-                axes.set_ylim(-1.2 * reach, 1.2 * reach)
     axes.plot(time_s, value, marks, color=colour, linewidth=1.0, markersize=3, label=label)
+
+
+def focus(axes: Axes, bounds: npt.NDArray[Any], values: npt.NDArray[Any]) -> None:
+    """Let the axis end a little beyond the values where bounds, at a start, are far wider."""
+    known = bounds[np.isfinite(bounds)]
+    if len(known):
+        reach = float(np.nanmax(np.abs(values), initial=np.quantile(known, 0.9)))
+        if known.max() > 2 * reach > 0:
+            axes.set_ylim(-1.2 * reach, 1.2 * reach)
+
+
+def compress(axes: Axes, values: npt.NDArray[Any], reach: float) -> None:
+    """Make the axis logarithmic beyond ``reach``, so that gross errors do not flatten the rest."""
+    if (np.abs(values) > 2 * reach).any():
+        axes.set_yscale("symlog", linthresh=reach)
+
+
+def _usual(values: npt.NDArray[Any]) -> float:
+    """Give what nine of ten values do not exceed, without their signs."""
+    known = np.abs(values[np.isfinite(values)])
+    return float(np.quantile(known, 0.9)) if len(known) else 0.0
 
 
 def draw_rejected(axes: Axes, positions: npt.NDArray[Any]) -> None:

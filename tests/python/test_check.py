@@ -323,11 +323,22 @@ def test_a_unit_of_speed_is_named(tmp_path: Path) -> None:
     """1852 m an hour are 0.514 m/s; what is 5 % off is a scale, and no unit."""
     settings = measure.trial("knots", "beacons", 3, tmp_path)
     told = {found.cause: found.text for found in check(tmp_path, settings).findings}
-    factor, unit = re.findall(r"times ([0-9.]+): are they in (.+)\?", told["speed_scale"])[0]
+    factor, unit = re.findall(r"times ([0-9.]+): told in (.+)\?", told["speed_scale"])[0]
     assert (float(factor), unit) == (pytest.approx(1852 / 3600, rel=0.03), "knots")
     log = LogFolder(tmp_path)
-    assert "are they" not in diagnosis._speeds(log, 0.48).message
-    assert "feet" in diagnosis._speeds(log, 0.3).message
+    for scale, unit in ((0.48, ""), (0.3, ": told in feet per second?"), (0.28, ": told in km/h?")):
+        assert diagnosis._speeds(log, scale).message.endswith(f"{scale:.3f}{unit}")
+
+
+def test_speeds_that_are_too_small_are_a_scale_too(tmp_path: Path) -> None:
+    settings = measure.trial("clean", "beacons", 3, tmp_path)
+    rows = np.loadtxt(tmp_path / "odometry.csv", delimiter=",", skiprows=1)
+    header = (tmp_path / "odometry.csv").read_text().splitlines()[0]
+    rows[:, header.split(",").index("speed_m_s")] *= 0.4
+    np.savetxt(tmp_path / "odometry.csv", rows, delimiter=",", header=header, comments="")
+    told = {found.cause: found.text for found in check(tmp_path, settings).findings}
+    factor = re.findall(r"times ([0-9.]+)", told["speed_scale"])[0]
+    assert float(factor) == pytest.approx(2.5, rel=0.03)
 
 
 def test_a_source_that_stands_apart_is_named(tmp_path: Path) -> None:

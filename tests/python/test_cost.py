@@ -34,6 +34,13 @@ def test_parameters_that_differ_are_written_with_all_their_digits():
     assert cost.made(default, "Sensor0", "make") == "Sensor0 make() { return Sensor0(); }"
 
 
+@pytest.mark.parametrize("name", ["LeaderRange", "ScaledRange", "BodyVelocity(axes=2)"])
+def test_a_sensor_that_does_not_say_where_it_stands_stands_where_the_chip_has_it(name):
+    model = cost._model(name, {}, None).model
+    assert model.stands
+    assert cost.made(model, "Sensor0", "make") == "Sensor0 make() { return Sensor0(); }"
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

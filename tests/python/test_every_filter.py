@@ -298,7 +298,7 @@ def test_a_measurement_from_nowhere_is_refused(kind, case):
     z = standing.h(start(process)[0])
     f, twin = (make(kind, name, sensors={"it": model, "there": standing}) for _ in range(2))
     before = everything(f)
-    lost = f"place.* must be given, for {type(model).__name__} was made without {model.place}"
+    lost = rf"must be given: it \({type(model).__name__}\) was made without {model.place}$"
     driven = None if not process.input else np.zeros((4, len(process.input)))
     where = np.tile(np.ravel(stated), (4, 1)).astype(float)
     where[2] = NAN
@@ -306,6 +306,8 @@ def test_a_measurement_from_nowhere_is_refused(kind, case):
     for given in (z, z.tolist(), np.float32(z)):
         with pytest.raises(ValueError, match=lost):
             f.update(given, "it")
+        with pytest.raises(ValueError, match=f"^place must be given: {type(model).__name__} was"):
+            f.update(given, model)
     with pytest.raises(ValueError, match=lost):
         f.run(rows, dt=1.0, input=driven, sensor="it")
     for call in (f.run, f.smooth):
@@ -313,7 +315,7 @@ def test_a_measurement_from_nowhere_is_refused(kind, case):
             call(rows, dt=1.0, input=driven, sensor=["it", "there", "it", "there"], place=where)
     with pytest.raises(ValueError, match=r"^run 0: place\[2\] must be given"):
         f.run(np.stack([rows, rows]), dt=1.0, input=driven, sensor="it", place=where)
-    with pytest.raises(ValueError, match=f"^{model.place} must be given"):
+    with pytest.raises(ValueError, match=f"^{type(model).__name__} was made without {model.place}"):
         model.h(start(process)[0])
     assert everything(f) == before
 

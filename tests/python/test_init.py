@@ -214,7 +214,7 @@ def test_the_command_prints_the_schema() -> None:
     assert call("init", "--schema").stdout == text()
 
 
-@pytest.mark.parametrize("command", ["init", "check", "replay"])
+@pytest.mark.parametrize("command", ["init", "check", "replay", "compare", "calibrate"])
 def test_layout_shows_every_file_and_column_of_a_log(command: str) -> None:
     """What it shows of each file is taken as the header of one."""
     shown = CliRunner().invoke(app, [command, "--layout"])

@@ -113,7 +113,31 @@ def test_a_run_is_drawn_with_what_it_claims() -> None:
     for given in (None, truth):
         assert not any(axes.collections for axes in plots.run(lean, truth=given).axes)
     smoothed = robust().smooth(z, dt=1.0, input=inputs)
-    assert curve(plots.run(smoothed).axes[0], "smoothed")[0] == smoothed.smoothed_x[:, 0].tolist()
+    plane, x, _ = plots.run(smoothed, truth=truth).axes
+    assert curve(plane, "smoothed")[0] == smoothed.smoothed_x[:, 0].tolist()
+    assert curve(x, "smoothed: error")[1] == (smoothed.smoothed_x - truth)[:, 0].tolist()
+    bounds = [band.get_datalim(x.transData).ymax for band in x.collections]
+    highest = [3 * np.sqrt(P[:, 0, 0].max()) for P in (smoothed.P, smoothed.smoothed_P)]
+    assert bounds == pytest.approx(highest, rel=1e-12)
+
+    # Where nobody knows the truth there is no error, and no places are none.
+    known = truth.copy()
+    known[3, 1] = np.nan
+    plane, x, _ = plots.run(result, truth=known, places=np.empty((0, 2))).axes
+    assert np.isnan(curve(x, "error")[1]).tolist() == [k == 3 for k in range(10)]
+    assert "places" not in [line.get_label() for line in plane.get_lines()]
+
+
+def test_gross_outliers_flatten_nothing() -> None:
+    beacon = auvest.LeaderRange(leader=(50.0, 0.0))
+    z = np.full(60, 50.0)
+    for scale in ("linear", "symlog"):
+        f = auvest.RobustEkf([0, 0], np.eye(2), process=auvest.SpeedHeading(), sensors=beacon)
+        result = f.run(
+            z + np.random.default_rng(1).normal(size=60), dt=1.0, input=np.zeros((60, 3))
+        )
+        assert [axes.get_yscale() for axes in plots.run(result).axes] == ["linear", scale, scale]
+        z[::9] += 2000.0
 
 
 def test_a_start_that_is_known_badly_does_not_flatten_the_rest() -> None:
@@ -146,6 +170,10 @@ def test_a_run_that_has_no_track_and_a_truth_of_another_length_are_refused() -> 
     two = fixes.run([[0, 0], [1, 0]], dt=1.0, input=np.zeros((2, 3)))
     with pytest.raises(ValueError, match=r"truth has shape \(3, 2\), expected \(2, 2\)"):
         plots.run(two, truth=np.zeros((3, 2)))
+    with pytest.raises(TypeError, match=r"many runs: draw one of them, result.run\(0\)"):
+        plots.run(fixes.run(np.zeros((3, 2, 2)), dt=1.0, input=np.zeros((2, 3))))
+    with pytest.raises(TypeError, match=r"must be an auvest\.RunResult, not ndarray"):
+        plots.run(np.zeros((3, 2)))
     with pytest.raises(ValueError, match=r"places has shape \(2,\), expected"):
         plots.run(two, places=(1.0, 2.0))
     with pytest.raises(ValueError, match=r"time_s has shape \(3,\), expected \(2,\)"):

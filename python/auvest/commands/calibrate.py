@@ -61,6 +61,7 @@ def command(
     output: options.Output = Path("auvest-output/calibrate"),
     no_figure: options.NoFigure = False,
     force: options.Force = False,
+    layout: log_options.Layout = False,  # noqa: ARG001 (shown when it is read)
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:

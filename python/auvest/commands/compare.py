@@ -56,6 +56,7 @@ def command(
     lag_s: log_options.Lag = None,
     output: options.Output = Path("auvest-output/compare"),
     force: options.Force = False,
+    layout: log_options.Layout = False,  # noqa: ARG001 (shown when it is read)
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:

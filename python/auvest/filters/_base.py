@@ -467,7 +467,7 @@ class GaussianFilter:
             given = np.atleast_1d(z) if handle.size == 1 and np.ndim(z) == 0 else z  # type: ignore[arg-type]
             row = as_array("z", given, (handle.size,), self._dtype, missing=True)
             if place is None and not np.isnan(row).any():
-                self._named_sensor(sensor)[1].require_standing("place")
+                self._require_place("place", sensor)
             there = None if place is None else self._as_place(place, handle)
             age = 0.0 if age_s is None else as_number("age_s", age_s, "not negative")
             code = self._filter.update(row, handle, there, age)
@@ -1146,15 +1146,22 @@ class GaussianFilter:
     ) -> None:
         """Refuse measurements of which neither the record nor the model says from where."""
         for k, one in enumerate(used):
-            model = self._named_sensor(one)[1]
-            if not model.stands:
+            if not self._named_sensor(one)[1].stands:
                 lost = ~np.isnan(z[:, 0])
                 if which is not None:
                     lost &= which == k
                 if places is not None:
                     lost &= np.isnan(places[:, 0])
                 if lost.any():
-                    model.require_standing(f"place[{int(np.argmax(lost))}]")
+                    self._require_place(f"place[{int(np.argmax(lost))}]", one)
+
+    def _require_place(self, argument: str, sensor: str | MeasurementModel | None) -> None:
+        """Refuse a measurement that comes without a place from a sensor that has none, either."""
+        name, model = self._named_sensor(sensor)
+        if not model.stands:
+            kind = type(model).__name__
+            which = kind if name == kind else f"{name} ({kind})"
+            raise ValueError(f"{argument} must be given: {which} was made without {model.place}")
 
     def _as_ages(self, age_s: npt.ArrayLike | None, count: int) -> Floats | None:
         if age_s is None:

@@ -308,6 +308,8 @@ def _model(text: str, own: Mapping[str, Found], loaded: LoadedModels | None) -> 
         known = ", ".join([*own, *sorted(classes)])
         raise ValueError(f"there is no model {name!r}, but {known}")
     model = classes[name](**arguments)
+    if isinstance(model, MeasurementModel):
+        model = model.standing()
     return _Model(model, registered()[model.core_name].replace("Scalar", "float"))
 
 

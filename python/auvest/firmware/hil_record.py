@@ -252,7 +252,7 @@ def place_names(model: MeasurementModel) -> list[str]:
     """Give the names in the core of what ``model.place`` names, in its order."""
     if model.place is None:
         return []
-    now = model._stood()
+    now = getattr(model.standing(), model.place)
     other = tuple(value + 1 for value in now) if isinstance(now, Sequence) else now + 1
     moved: Any = replace(model, **{model.place: other})  # type: ignore[type-var]
     before, after = model._core_params(), moved._core_params()

@@ -415,7 +415,7 @@ def _units(files: dict[str, FileSeen], limits: Limits) -> Iterator[Finding]:
         # Lines of one time are of several sources, known or not.
         several = "source" in seen.table.names or name == "echoes.csv"
         if seen.lines > 2 and seen.equal > 0.5 * (seen.lines - 1) and not several:
-            message = f"{seen.equal + 1} of {seen.lines} lines have the time of the line before"
+            message = f"{seen.equal} of {seen.lines} lines have the time of the line before"
             yield finding("times_equal", message, file=name, line=seen.first_equal)
             continue
         same = sum(one.same_time for one in seen.sources.values())

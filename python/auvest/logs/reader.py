@@ -531,7 +531,9 @@ class LogFolder:
     def __init__(self, path: Path, *, truth: bool = True, reading: Reading | None = None) -> None:
         self.path = path
         if not path.is_dir():
-            raise LogError(path, "is not a folder; a log is a folder of CSV files (docs/logs.md)")
+            raise LogError(
+                path, "is not a folder; a log is one of CSV files (auvest check --layout)"
+            )
         reading = Reading() if reading is None else reading
         paths = {name: path / (reading.of(name).file or name) for name in FILES}
         for name, one in paths.items():

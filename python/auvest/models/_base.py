@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -24,6 +24,8 @@ from auvest._fields import Checked
 from auvest._state import describe
 
 if TYPE_CHECKING:
+    from typing_extensions import Self
+
     from auvest._core import _Process, _Sensor
 
 _FLOAT64 = np.dtype(np.float64)
@@ -170,7 +172,7 @@ class MeasurementModel(Model):
     observes: ClassVar[tuple[str, ...]] = ("x_m", "y_m")
     measures: tuple[str, ...] = ()
     place: ClassVar[str | None] = None
-    #: What `place` names where the model does not say; it is never measured from there.
+    #: What `place` names in the core where the model does not say; nothing is measured from there.
     _elsewhere: ClassVar[Any] = None
     _squares = True
 
@@ -179,24 +181,11 @@ class MeasurementModel(Model):
         """Whether a measurement needs no ``place``: the model has it, or has no use for one."""
         return self.place is None or getattr(self, self.place) is not None
 
-    def require_standing(self, argument: str) -> None:
-        """Refuse a measurement that comes without a place where the model has none, either.
-
-        Raises
-        ------
-        ValueError
-            Which names ``argument``.
-        """
-        if not self.stands:
-            raise ValueError(
-                f"{argument} must be given, for {type(self).__name__} was made without {self.place}"
-            )
-
-    def _stood(self) -> Any:
-        """Give what `place` names."""
-        if self.place is None:
-            return None
-        return getattr(self, self.place) if self.stands else self._elsewhere
+    def standing(self) -> Self:
+        """Give the same model where it stands: itself or, if it does not, where C++ puts it."""
+        if self.place is None or self.stands:
+            return self
+        return replace(self, **{self.place: self._elsewhere})  # type: ignore[type-var]
 
     def _core_defaults(self) -> dict[str, float]:
         return _core.sensor_defaults(self.core_name)
@@ -228,7 +217,7 @@ class MeasurementModel(Model):
             except _core.StatusError as error:
                 if error.status != Status.far_from_origin or self.place is None:
                     raise
-                place = np.array(self._stood())
+                place = np.array(getattr(self.standing(), self.place))
                 raise ValueError(far_from_origin(self.place, place, dtype)) from None
             sensor.description = saved_as(self)
             sensor.stands = self.stands
@@ -254,7 +243,10 @@ class MeasurementModel(Model):
             If a shape is wrong, a state so large that its measurement is not finite, or the model
             does not say where it stands.
         """
-        self.require_standing(str(self.place))
+        if not self.stands:
+            raise ValueError(
+                f"{type(self).__name__} was made without {self.place}: say where it is"
+            )
         least = len(self.observes)
         shape = np.shape(x)
         if len(shape) not in (1, 2) or shape[-1] < least:

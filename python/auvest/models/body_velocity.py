@@ -58,7 +58,8 @@ class BodyVelocity(MeasurementModel):
         return ("forward_m_s", "sideways_m_s", "vertical_m_s")[: self.axes]
 
     def _core_params(self) -> dict[str, float]:
-        return {**super()._core_params(), "heading_rad": self._stood()}
+        heading_rad = self._elsewhere if self.heading_rad is None else self.heading_rad
+        return {**super()._core_params(), "heading_rad": heading_rad}
 
     @property
     def core_name(self) -> str:

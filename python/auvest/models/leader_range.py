@@ -53,6 +53,6 @@ class LeaderRange(MeasurementModel):
 
     def _core_params(self) -> dict[str, float]:
         params = super()._core_params()
-        params["leader_x_m"], params["leader_y_m"] = self._stood()
         del params["leader"]
-        return params
+        x_m, y_m = self._elsewhere if self.leader is None else self.leader
+        return {**params, "leader_x_m": x_m, "leader_y_m": y_m}

@@ -42,8 +42,12 @@ TIE_SHARE, TIE = 0.05, 6.0
 LATENCIES_S = (0.5, 2.0, 8.0)
 DEPTHS_M = (8.0, 24.0, 72.0)
 SCALES = (0.9, 0.96, 1.04, 1.1)
-#: Metres, or metres per second, in what a speed or a distance may have been told in.
-SPEED_UNITS = {"knots": 1852 / 3600, "feet": 0.3048, "km/h": 1 / 3.6}
+#: Metres per second in what a speed may have been told in.
+SPEED_UNITS = {
+    "knots": 1852 / 3600, "feet per second": 0.3048, "km/h": 1 / 3.6, "miles per hour": 0.44704,
+}  # fmt: skip
+#: Of speeds, the usual mistakes among them, and the same the other way.
+SPEEDS = (0.29, SPEED_UNITS["knots"], *SCALES, 1 / SPEED_UNITS["knots"], 3.4)
 #: A scale so near to that of a unit, as a share, is taken for it.
 NEAR_UNIT = 0.05
 NOISES = (3.0, 10.0)
@@ -296,7 +300,7 @@ def _families(log: LogFolder, rows: Columns, *, gross: bool) -> Iterator[list[Hy
         yield list(_degrees(log))
         yield list(_noises())
     if not tracking:
-        yield Number(partial(_speeds, log), (*SPEED_UNITS.values(), *SCALES))
+        yield Number(partial(_speeds, log), SPEEDS)
     if not tracking and "positions.csv" in log:
         yield _latency("positions", {"positions.csv"})
     if not any(name in log for name in names):  # absolute positions alone
@@ -420,10 +424,9 @@ def _speeds(log: LogFolder, scale: float) -> Hypothesis:
     moved = ("forward_m", "left_m", "speed_m_s", "left_m_s")
     at = [k for k, name in enumerate(log["odometry.csv"].names) if name in moved]
     changes = columns_changed({k: lambda rows, k=k: scale * rows[:, k] for k in at})  # type: ignore[misc]
-    units = [unit for unit, size in SPEED_UNITS.items() if abs(scale / size - 1) < NEAR_UNIT]
-    message = f"it fits with speeds and distances times {scale:.3f}" + "".join(
-        f": are they in {unit}?" for unit in units
-    )
+    off, unit = min((abs(scale / size - 1), unit) for unit, size in SPEED_UNITS.items())
+    told = f": told in {unit}?" if off < NEAR_UNIT else ""
+    message = f"it fits with speeds and distances times {scale:.3f}{told}"
     return Hypothesis("speed_scale", {"odometry.csv": changes}, message)
 
 

@@ -885,7 +885,7 @@ def _places(sensor: MeasurementModel) -> int:
     """Say how many numbers the place of a sensor has."""
     if sensor.place is None:
         return 0
-    place = sensor._stood()
+    place = getattr(sensor.standing(), sensor.place)
     return len(place) if isinstance(place, tuple) else 1
 
 

@@ -65,19 +65,16 @@ def _tracks(axes: Axes, result: Result) -> None:
 def _errors(pair: tuple[Axes, Axes], result: Result) -> None:
     rows, colour = result.errors.columns(), plots.FILTER_COLOURS[result.filter_name]
     for axes, name in zip(pair, "xy", strict=True):
-        error, sigma = rows[f"error_{name}_m"], rows[f"sigma_{name}_m"]
-        plots.draw_band(axes, rows["time_s"], error, sigma, colour, "error", "-")
-        if f"smoothed_error_{name}_m" in rows:
-            axes.plot(
-                rows["time_s"], rows[f"smoothed_error_{name}_m"], "--", color=plots.ORANGE,
-                linewidth=1.0, label="smoothed: error",
-            )  # fmt: skip
-            for sign in (-3, 3):
-                axes.plot(
-                    rows["time_s"], sign * rows[f"smoothed_sigma_{name}_m"], ":",
-                    color=plots.ORANGE, linewidth=0.8,
-                    label="smoothed: ±3 sigma" if sign > 0 else None,
-                )  # fmt: skip
+        claimed, errors = [], []
+        for prefix, own, *looks in plots.ERRORS:
+            if f"{prefix}error_{name}_m" in rows:
+                error, sigma = rows[f"{prefix}error_{name}_m"], rows[f"{prefix}sigma_{name}_m"]
+                plots.draw_band(
+                    axes, rows["time_s"], error, sigma, own if prefix else colour, *looks
+                )
+                claimed.append(3 * sigma)
+                errors.append(error)
+        plots.focus(axes, np.concatenate(claimed), np.concatenate(errors))
         plots.style(axes, ylabel=f"{name} error / m")
     _legend(pair[0])
     pair[1].set_xlabel("time / s")
@@ -98,7 +95,7 @@ def _innovation(axes: Axes, result: Result, m: int) -> None:
     if away.any():
         rejected = doubted["time_s"][away], doubted[f"innovation_{m}"][away]
         axes.plot(*rejected, "x", color=colour, markersize=5, label=tables.REJECTED)
-    _compress(axes, value, 12 * float(np.quantile(sigma, 0.9)) if len(at) else 1.0)
+    plots.compress(axes, value, 12 * float(np.quantile(sigma, 0.9)) if len(at) else 1.0)
     names = ("range / m", "bearing / rad") if ranged.any() else ("x / m", "y / m")
     plots.style(axes, ylabel=names[m])
     _legend(axes)
@@ -112,16 +109,10 @@ def _nis(axes: Axes, result: Result) -> None:
     axes.plot(rows["time_s"], rows["nis"], ".", color=colour, markersize=3, label="NIS")
     axes.axhline(high, color=plots.BLACK, linewidth=0.9, linestyle="--",
                  label=f"95 % below {high:.2f}")  # fmt: skip
-    _compress(axes, rows["nis"], 2 * high)
+    plots.compress(axes, rows["nis"], 2 * high)
     axes.margins(y=0.1)
     plots.style(axes, ylabel="NIS", ylim=(0.0, None))
     _legend(axes)
-
-
-def _compress(axes: Axes, value: Floats, reach: float) -> None:
-    """Make the axis logarithmic beyond ``reach``, so that gross errors do not flatten the rest."""
-    if (np.abs(value) > 2 * reach).any():
-        axes.set_yscale("symlog", linthresh=reach)
 
 
 def _legend(axes: Axes) -> None:
