@@ -163,7 +163,8 @@ TEST_CASE("CheckpointRing: in the background, from a copy, one at a time") {
   SlowStore store(memory.data(), memory.size());
   CheckpointRing<SlowStore, kPayload> ring(store, kKind);
   CHECK_FALSE(ring.poll());
-  CHECK(ring.begin({5, 6, 7, true}) == 1);
+  // Of four bytes each, none of which memory holds by chance where one is not written.
+  CHECK(ring.begin({0x51525354, 0x61626364, 0x71727374, true}) == 1);
   CHECK(store.woken == 1);
   CHECK(store.written == 0);
   int polls = 0;
@@ -179,8 +180,9 @@ TEST_CASE("CheckpointRing: in the background, from a copy, one at a time") {
   CheckpointRing<SlowStore, kPayload> again(store, kKind);
   CHECK(again.find() == 1);
   CHECK(again.sum() == ring.sum());
-  CHECK(again.time().microseconds == 6);
-  CHECK(again.time().start == 7);
+  CHECK(again.time().seconds == 0x51525354);
+  CHECK(again.time().microseconds == 0x61626364);
+  CHECK(again.time().start == 0x71727374);
   CHECK(again.time().absolute);
 }
 

@@ -6,6 +6,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <initializer_list>
 #include <limits>
@@ -463,6 +464,7 @@ TEST_CASE("mixture: a ring is the product of the prior with its components") {
     Mixture mixture;
     REQUIRE(mixture.ring(prior, circle, count));
     REQUIRE(mixture.size == count);
+    CHECK(*std::max_element(mixture.weight, mixture.weight + count) == 1);
     const double s = kPi / count;
     const double first = std::atan2(prior.x(1) - circle.centre[1], prior.x(0) - circle.centre[0]);
     double log_first = 0;

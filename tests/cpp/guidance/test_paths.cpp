@@ -244,6 +244,22 @@ TEST_CASE_TEMPLATE("waypoints: arcs join the legs without a step in place or dir
   CHECK(std::fabs(travelled - length) < 0.3);
 }
 
+TEST_CASE_TEMPLATE("waypoints: a turn too small for an arc is none, and the next leg follows",
+                   Scalar, float, double) {
+  // The sine of this turn is a number without its full digits: no arc begins with it.
+  const Scalar aside = (std::numeric_limits<Scalar>::min)();
+  const auvest::Waypoint<Scalar> corners[] = {
+      {Scalar(0), Scalar(0)}, {Scalar(100), Scalar(0)}, {Scalar(200), aside}};
+  auto path = plan_with<Scalar>(12, 20);
+  REQUIRE(path.start(corners, 3) == Status::kOk);
+  PathPoint<Scalar> point;
+  REQUIRE(path.locate(Scalar(101), Scalar(2), point) == Status::kOk);
+  CHECK(!path.on_arc());
+  CHECK(path.leg() == 1);
+  CHECK(near(point.along_m, 1, 100));
+  CHECK(near(point.cross_m, 2, 100));
+}
+
 TEST_CASE_TEMPLATE("waypoints: what quiet periods form ahead is what a switch forms by itself",
                    Scalar, float, double) {
   // A right corner, one of 0.3 rad, none, and one of 1.9 rad to port; places on every leg and arc.

@@ -86,6 +86,19 @@ TEST_CASE("factor of the leading block: a lost pivot is floored, a bad diagonal 
     q << 1, 0, 0, bad;
     CHECK_FALSE(auvest::math::factor_leading(q, root, none));
   }
+  // With a third component, which both of these say all about: the first is taken.
+  Matrix<float, 1, 2> slope;
+  const Matrix<float, 3, 3> all = Matrix<float, 3, 3>::Ones();
+  REQUIRE(auvest::math::factor_leading(all, root, slope));
+  CHECK(root(1, 1) ==
+        close_to(std::sqrt(4.0 * double(std::numeric_limits<float>::epsilon())), 1e-7));
+  CHECK(slope(0, 0) == 1);
+  CHECK(slope(0, 1) == 0);
+  for (const float bad : {0.0f, -1.0f, std::nanf("")}) {
+    Matrix<float, 3, 3> q = Matrix<float, 3, 3>::Identity();
+    q(1, 1) = bad;
+    CHECK_FALSE(auvest::math::factor_leading(q, root, slope));
+  }
 }
 
 TEST_CASE("LDL': gives the matrix back, floors and refuses as the root does") {

@@ -673,6 +673,15 @@ TEST_CASE("range and bearing: the near field begins where the belief reaches the
   // The measured position minus the believed one.
   CHECK(innovation(0) == close_to(1.1 * std::cos(0.4) - 1, 1e-12));
   CHECK(innovation(1) == close_to(1.1 * std::sin(0.4), 1e-12));
+
+  // Of 0: what lies less than 1e-15 m from the station, which has no bearing.
+  auto none = model;
+  none.params.near_field = none.params.station_x_m = none.params.station_y_m = 0;
+  belief.x.setZero();
+  belief.x(0) = 2e-15;
+  CHECK_FALSE(none.near_field(none.about(belief.x), belief.P, z, innovation, noise));
+  belief.x(0) = 0.5e-15;
+  CHECK(none.near_field(none.about(belief.x), belief.P, z, innovation, noise));
 }
 
 TEST_CASE("range and bearing: covariance of the position form, by Monte Carlo" *

@@ -55,6 +55,7 @@ TEST_CASE("particle set: a copy has the same particles, and a place of its own")
   *copy.at(3, 1) = 0;
   copy.log_weight(3) = 0;
   copy.resize(1);
+  CHECK(copy.size() == 1);  // fewer than before
   CHECK(*set.at(3, 1) == 31);
   CHECK(set.log_weight(3) == -3);
   CHECK(set.size() == n);

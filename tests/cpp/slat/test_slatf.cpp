@@ -280,6 +280,13 @@ TEST_CASE_TEMPLATE("SLATF: refused calls leave all bits", Filter,
   auto bad_sonar = sonar.params;
   bad_sonar.sigma_range_m = 0;
   CHECK(filter.update(seen, 1, auvest::Sonar<float>(bad_sonar), random) == Status::kBadParameter);
+  for (float auvest::Sonar<float>::Params::*sigma :
+       {&auvest::Sonar<float>::Params::sigma_range_m,
+        &auvest::Sonar<float>::Params::sigma_bearing_rad}) {
+    auto blunt = sonar.params;  // one of them alone is too large
+    blunt.*sigma = 1.1e15f;
+    CHECK(filter.update(seen, 1, auvest::Sonar<float>(blunt), random) == Status::kOverflow);
+  }
   auto wrong = seen[0];
   wrong.z(1) = nan;
   CHECK(filter.update(&wrong, 1, sonar, random) == Status::kNotFinite);

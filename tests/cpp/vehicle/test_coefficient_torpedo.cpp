@@ -47,6 +47,28 @@ TEST_CASE("remus100_prestero: what it says about added mass twice agrees") {
   }
 }
 
+TEST_CASE("remus100_prestero: on its side it is the same body of revolution") {
+  auto only = auvest::remus100_prestero<double>();  // what goes with u, and the fins
+  only.y_vv = only.y_rr = only.z_ww = only.z_qq = 0;
+  only.m_ww = only.m_qq = only.n_vv = only.n_rr = 0;
+  const auvest::CoefficientTorpedo<double> loads(only);
+  const double u = 1.5, v = 0.3, r = 0.2, fin = 0.1;
+  // Rolled by 90 degrees to port: sway is heave, and a yaw rate one in pitch with the other sign.
+  const double turning[6] = {u, v, 0, 0, 0, r}, rolled[6] = {u, 0, v, 0, -r, 0};
+  double rudder[3] = {}, stern_planes[3] = {};
+  rudder[auvest::kRudder] = fin;
+  stern_planes[auvest::kSternPlanes] = fin;  // down, as the turned rudder goes to starboard
+  double yawed[6] = {}, pitched[6] = {};
+  auvest::Flow<double> flow;
+  flow.set(turning, false, auvest::SixDof());
+  loads.add_loads(yawed, flow, rudder, auvest::SixDof());
+  flow.set(rolled, false, auvest::SixDof());
+  loads.add_loads(pitched, flow, stern_planes, auvest::SixDof());
+  CHECK(yawed[0] == close_to(pitched[0], 1e-12));
+  CHECK(yawed[1] == close_to(pitched[2], 1e-12));
+  CHECK(yawed[5] == close_to(-pitched[4], 1e-12));
+}
+
 TEST_CASE_TEMPLATE("remus100_prestero: steady speed, and the signs of its fins", Scalar, float,
                    double) {
   const double speed = std::sqrt(3.86 / 1.62);

@@ -40,6 +40,19 @@ TEST_CASE_TEMPLATE("largest step: the lag of a fin bounds Rk4 by 2.785 T, one ev
   CHECK(auvest::check_step<Rk4>(hull, x, c, nan) == Status::kUnstableStep);
 }
 
+TEST_CASE("largest step: that of the shaft, the last state, where its lag is the shortest") {
+  using Hull = Remus<double>;
+  auto p = auvest::remus100<double>();
+  p.propeller.shaft.time_constant_s = 0.02;
+  const Hull hull(p);
+  const auto c = command<Hull>(0, 0, 900);
+  // 2.785 and 2 time constants, as of a fin.
+  const Hull::State x = Hull::State::Zero();
+  CHECK(auvest::largest_stable_step<Rk4>(hull, x, c) == doctest::Approx(0.0557058).epsilon(1e-3));
+  CHECK(auvest::largest_stable_step<SemiImplicit>(hull, x, c) ==
+        doctest::Approx(0.04).epsilon(1e-3));
+}
+
 /// How much a small push has grown after 400 steps.
 template <class Method, class Hull>
 double growth(const Hull& hull, typename Hull::State x, const typename Hull::Command& c, double h) {
