@@ -19,6 +19,7 @@ import termios
 import threading
 import time
 import tty
+import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -86,6 +87,13 @@ def test_a_line_that_is_not_whole_is_refused(line: str) -> None:
     assert telemetry.body_of("$AUV*cbdd6335") == "AUV"
     with pytest.raises(LineError):
         telemetry.body_of(line)
+
+
+def test_a_damaged_line_is_told_both_checksums() -> None:
+    """That of "123456789", which every catalogue has, for a line that lost its last character."""
+    said = f"^checksum cbf43926, but {zlib.crc32(b'12345678'):08x} computed: "
+    with pytest.raises(LineError, match=said):
+        telemetry.body_of("$12345678*cbf43926")
 
 
 @pytest.mark.parametrize("line", ["$AUV,1,2*55", "# columns: sample,time_s"])

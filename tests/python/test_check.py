@@ -7,6 +7,7 @@ import math
 import os
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +19,18 @@ from typer.testing import CliRunner
 from auvest.cli import app
 from auvest.importers.sets import IMPORTERS
 from auvest.logs import LogError, LogFolder, reader
+from auvest.logs.check import survey
 from auvest.logs.findings import CAUSES, worst
 from auvest.logs.write import write_file
-from auvest.replay import Settings, diagnosis, find_settings, replay, settings_from
-from auvest.replay.checks import Checked, check, files
-from auvest.replay.health import RECOVERIES_NOT_TRUSTED, Residuals, health, truncated_moments
+from auvest.replay import Settings, diagnosis, find_settings, replay, report, settings_from
+from auvest.replay.checks import Checked, check, files, limits
+from auvest.replay.health import (
+    RECOVERIES_NOT_TRUSTED,
+    Residuals,
+    SourceHealth,
+    health,
+    truncated_moments,
+)
 from auvest.replay.health import findings as health_findings
 from auvest.replay.tables import Batch, blank_measurements
 from auvest.reproduce.mistakes import measure
@@ -159,6 +167,34 @@ def test_findings_have_the_line_of_the_file(
     cut = arc(tmp_path / "cut")
     edit(cut / "ranges.csv", 9, "16.0,1")
     assert named(check(cut, Settings())) == [("unreadable", "ranges.csv", 9)]
+
+
+def test_where_the_unit_of_time_is_wrong_no_step_of_it_is_a_gap(tmp_path: Path) -> None:
+    """Steps of a second, written as 1000, are what one finding says, not sixty."""
+    arc(tmp_path)
+    for name in ("odometry.csv", "ranges.csv"):
+        lines = (tmp_path / name).read_text().splitlines()
+        cells = [line.split(",", 1) for line in lines[1:]]
+        for k, (time, rest) in enumerate(cells):
+            edit(tmp_path / name, k + 2, f"{1000 * float(time)!r},{rest}")
+    seen = survey(LogFolder(tmp_path), limits(Settings()))
+    assert [(one.cause, one.file) for one in seen.findings] == [("milliseconds", "odometry.csv")]
+
+
+@pytest.mark.parametrize("lines", [7, 32768])
+def test_equal_times_are_counted_over_all_of_a_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lines: int
+) -> None:
+    """A line a second under a clock of steps of 4 s: of each four, three have the time before."""
+    monkeypatch.setattr(reader, "CHUNK_LINES", lines)
+    arc(tmp_path)
+    for k in range(61):
+        edit(tmp_path / "odometry.csv", k + 2, f"{k // 4 * 4},1.0,0.02")
+    seen = survey(LogFolder(tmp_path), limits(Settings()))
+    assert seen.files["odometry.csv"].equal == 45
+    assert ("times_equal", "odometry.csv", 3) in [
+        (one.cause, one.file, one.line) for one in seen.findings
+    ]
 
 
 def test_a_craft_that_stands_may_be_silent(tmp_path: Path) -> None:
@@ -374,6 +410,36 @@ def test_a_source_of_which_most_is_thrown_away_stands_apart() -> None:
 
 
 @pytest.mark.parametrize(
+    ("of_4", "of_7", "apart"), [(2, 12, [7]), (12, 12, []), (0, 2, []), (12, 0, [4])]
+)
+def test_a_source_is_off_where_most_of_it_is_and_the_others_are_not(
+    of_4: int, of_7: int, apart: list[int]
+) -> None:
+    """Of each twenty so many beyond three sigma: a tenth is outliers, and both are no source's."""
+    rows: dict[str, Any] = blank_measurements(40)
+    rows["time_s"] = np.arange(40.0)
+    rows["source"] = np.tile([4, 7], 20)
+    rows["nis"] = np.column_stack([np.arange(20) < of_4, np.arange(20) < of_7]).ravel() * 20.0
+    rows["innovation_0"], rows["sigma_0"] = np.sqrt(rows["nis"]), np.ones(40)
+    residuals = Residuals()
+    nothing: dict[str, Any] = {}
+    residuals.add(Batch(nothing, rows, nothing, np.full(40, 50.0)))
+    told = [one.message for one in health_findings(residuals) if one.cause == "source_off"]
+    assert [int(message.split()[1].rstrip(":")) for message in told] == apart
+
+
+def test_what_a_source_left_is_said_in_metres_and_percent() -> None:
+    """Ranges that are 7 % too long, a quarter of them beyond three sigma."""
+    left = SourceHealth(7, 40, beyond_share=0.25, median_m=-1.5, spread_m=0.5, trend=0.07)
+    judged = replace(health(Residuals(), []), sources=[left])
+    said = (
+        "40 measurements, 25 % beyond three sigma, median -1.50 m, spread 0.50 m, "
+        "+7.00 % of the range"
+    )
+    assert report.sources(judged) == [("source 7", said)]
+
+
+@pytest.mark.parametrize(
     ("kind", "section", "key"), [("beacons", "fixes", "every_s"), ("tracking", "ranges", "sigma_m")]
 )
 def test_settings_for_the_other_kind_of_log_are_named(
@@ -439,6 +505,20 @@ def test_a_slip_that_leaves_small_innovations_is_named(slip: str, tmp_path: Path
     result = replay(LogFolder(tmp_path), KINDS["leaders"].settings, causes=False)
     assert result.health.verdict == verdict
     assert cause in [one.cause for one in result.findings]
+
+
+@pytest.mark.parametrize(("lines", "cause"), [(2, "clock_jump"), (3, "milliseconds")])
+def test_of_which_unit_a_time_is_takes_two_gaps_to_say(
+    lines: int, cause: str, tmp_path: Path
+) -> None:
+    """One of 100 s can be anything; a second, with 1.5 m on the way, is 0.1 s of a craft."""
+    write_file(
+        tmp_path, "fixes.csv", time_s=100.0 * np.arange(lines), source=np.ones(lines),
+        range_m=10.0 + 1.5 * np.arange(lines), bearing_rad=np.zeros(lines),
+    )  # fmt: skip
+    write_file(tmp_path, "beacons.csv", source=[1], x_m=[0.0], y_m=[0.0])
+    seen = survey(LogFolder(tmp_path), limits(Settings()))
+    assert [one.cause for one in seen.findings] == [cause]
 
 
 def test_a_filter_that_does_not_know_where_it_is_is_not_trusted() -> None:

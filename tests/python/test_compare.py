@@ -84,6 +84,18 @@ def test_what_it_writes(compared: tuple[Path, dict[str, Any]]) -> None:
         assert {"estimates.parquet", "measurements.parquet", "trajectory.tum"} <= tables
 
 
+def test_a_warning_is_of_its_filter_or_of_the_log_where_all_have_it(
+    compared: tuple[Path, dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, _ = compared
+    monkeypatch.setattr(report, "warnings", lambda one: ["of all", f"of {one.filter_name}"])
+    options = [part for name in FILTERS for part in ("--filter", name)]
+    ran = compare(folder / "log", *options, "--output", tmp_path)
+    assert ran.exit_code == 0, ran.output
+    notes = [line.removeprefix("Note: ") for line in ran.stderr.splitlines() if "of " in line]
+    assert notes == ["log: of all", "EKF: of ekf", "robust EKF: of robust-ekf"]
+
+
 def test_one_page_has_all_tracks(compared: tuple[Path, dict[str, Any]], tmp_path: Path) -> None:
     folder, _ = compared
     page = (folder / "out" / "log" / "report.html").read_text(encoding="utf-8")

@@ -19,7 +19,8 @@ def test_the_types_are_those_of_the_core():
 def test_a_model_is_a_name_with_parameters():
     assert cost._call("Walk") == ("Walk", {})
     assert cost._call(" Walk(psd=-0.5, axes=3) ") == ("Walk", {"psd": -0.5, "axes": 3})
-    for text in ("Walk(0.5)", "Walk(psd=open('x'))", "a.Walk()", "Walk(", "3", "Walk(**{})"):
+    others = ("Walk(0.5)", "Walk(psd=open('x'))", "a.Walk()", "a.Walk", "Walk(", "3", "Walk(**{})")
+    for text in others:
         with pytest.raises(ValueError, match=r"a model is Name or Name\(parameter=value"):
             cost._call(text)
 

@@ -190,8 +190,8 @@ def test_the_truth_is_beside_the_track(results: Path) -> None:
     ("options", "message"),
     [
         (["--epoch", "-1e9"], "is none that can be exported"),
-        (["--epoch", "inf"], "inf is no time"),
-        (["--origin", "91", "0"], "is no place on Earth"),
+        (["--epoch", "inf"], "Invalid value for '--epoch': inf is no time"),
+        (["--origin", "91", "0"], "Invalid value for '--origin': (91.0, 0.0) is no place on Earth"),
     ],
 )
 def test_what_cannot_be_exported_leaves_nothing(

@@ -23,7 +23,7 @@ from typer.testing import CliRunner
 import auvest
 from auvest import telemetry
 from auvest.cli import app
-from auvest.firmware import hil, hil_serial, hil_slat
+from auvest.firmware import hil, hil_bench, hil_serial, hil_slat, hil_trace
 from auvest.firmware.cost import registered
 from auvest.firmware.hil_bench import ANEW, Bench, answer_of, bench, row_frame
 from auvest.firmware.hil_record import Record, place_names
@@ -183,6 +183,27 @@ def test_a_program_is_written_for_every_process_and_its_sensors(name: str) -> No
 def test_another_parameter_is_another_program(record: Record) -> None:
     sensors = tuple(replace(model, sigma_range_m=0.31) for model in record.sensors)
     assert bench(replace(record, sensors=sensors)).digest != bench(record).digest
+
+
+def test_a_model_that_the_registry_does_not_have_is_named() -> None:
+    assert hil_bench._type("BodyVelocity3", 5) == "auvest::BodyVelocity<float, 5, 3>"
+    with pytest.raises(ValueError, match=r"^Drifter is no model of the registry"):
+        hil_bench._type("Drifter", 4)
+
+
+def test_a_trace_has_the_parts_of_a_status_word(tmp_path: Path, record: Record) -> None:
+    """From the lowest byte: status, decision, near field, recovered."""
+    words = np.zeros((len(record) + 1, len(record.fields)), np.uint32)
+    words[1, 0], words[2, 0], words[3, 0] = 0x01_00_02_0E, 0x00_01_00_00, 0x00_00_10_F1
+    words[2, 1] = 0x3FC00000  # 1.5
+    hil_trace.write_trace(tmp_path / "trace.parquet", record, words, None)
+    told = pa_parquet.read_table(tmp_path / "trace.parquet").slice(0, 4).to_pydict()
+    assert told["status"] == [0, 14, 0, 0xF1]  # also of a target that answers what none may
+    assert told["decision"] == [0, 2, 0, 16]
+    assert told["near_field"] == [False, False, True, False]
+    assert told["recovered"] == [False, True, False, False]
+    assert told[record.fields[1]] == [0.0, 0.0, 1.5, 0.0]
+    np.testing.assert_allclose(told["time_s"], np.concatenate([[0], np.cumsum(record.dt[:3])]))
 
 
 def test_a_record_that_cannot_be_is_refused() -> None:
@@ -451,6 +472,26 @@ def test_what_is_not_installed_is_named(
     monkeypatch.setitem(sys.modules, "serial", None)
     with pytest.raises(hil_serial.LineLost, match=r"pip install 'auvest\[serial\]'"):
         hil.run(record, "serial:/dev/ttyACM0", tmp_path)
+
+
+def test_what_fails_on_a_chip_is_named_with_its_target(
+    record: Record, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By the name that was asked for, not by that of the machine which QEMU has for it."""
+    monkeypatch.setattr(hil.shutil, "which", lambda _: "/bin/true")
+    asked = []
+
+    def call(command: list[str], what: str) -> None:
+        asked.append((Path(command[0]).name, what))
+        if command[0].startswith("qemu"):
+            raise hil.HilError(f"{what} failed")
+
+    monkeypatch.setattr(hil, "_call", call)
+    with pytest.raises(hil.HilError, match="running on cortex-m4f failed"):
+        hil.run(record, "cortex-m4f", tmp_path)
+    compiler, emulator = asked
+    assert compiler == ("arm-none-eabi-g++", "compiling for cortex-m4f")
+    assert emulator == ("qemu-system-arm", "running on cortex-m4f")
 
 
 def test_a_port_that_is_not_there_leaves_the_sketch(log: Path, tmp_path: Path) -> None:

@@ -351,6 +351,8 @@ def test_settings_that_are_wrong_are_named(document: dict[str, Any], words: str)
     [
         ({"columns": {"odometry": {"speed_m_s": "v"}}}, "time_s,u,yaw_rate_rad_s\n", 1, None,
          r"has no column 'v', which run\.toml: \[columns\.odometry\] names for speed_m_s, but "),
+        ({"columns": {"odometry": {"speed_m_s": "-v"}}}, "time_s,u,yaw_rate_rad_s\n", 1, None,
+         r"has no column 'v', which run\.toml: \[columns\.odometry\] names for speed_m_s, but "),
         ({"columns": {"odometry": {"speed_m_s": "v"}}}, "time_s,v,yaw_rate_rad_s\n0,x,0\n", 2, "v",
          "'x' is not a number"),
         ({"columns": {"odometry": {"speed_m_s": "v"}},

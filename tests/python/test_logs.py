@@ -125,6 +125,25 @@ def test_blank_lines_that_others_follow_are_errors(
 
 
 @pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("depth.csv", "time_s,depth_m"),
+        ("truth.csv", "time_s,x_m,y_m[,heading_rad]"),
+        ("positions.csv", "time_s,x_m,y_m[,sigma_m,depth_m]"),
+        ("start.csv", "time_s,x_m,y_m,heading_rad or time_s,x_m,y_m"),
+    ],
+)
+def test_a_header_that_is_wrong_is_told_what_it_must_be(
+    tmp_path: Path, name: str, expected: str
+) -> None:
+    """What may be left out is in brackets, of which there are none where nothing may."""
+    (tmp_path / name).write_text("a,b\n1,2\n")
+    with pytest.raises(LogError) as caught:
+        CsvTable(tmp_path / name)
+    assert str(caught.value).endswith(f"line 1: the header must be {expected}, not a,b")
+
+
+@pytest.mark.parametrize(
     ("text", "cause"),
     [
         ("time_s;source;range_m\n1;0;5\n", "separator"),

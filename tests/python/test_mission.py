@@ -234,6 +234,18 @@ def test_the_command_writes_what_it_shows(tmp_path):
     assert len(rows) == 3400
 
 
+def test_the_table_says_what_was_flown(tmp_path):
+    arguments = ["simulate", "mission", "--runs", "2", "--track", "circle", "--seed", "7"]
+    done = CliRunner().invoke(app, [*arguments, "--output", str(tmp_path), "--no-figure"])
+    assert done.exit_code == 0, done.output
+    plan = Mission(track="circle", runs=2, seed=7)
+    title = (
+        f"circle, {plan.estimate}, {plan.guidance}: 2 runs, {plan.degrees_of_freedom} degrees of "
+        f"freedom, current {plan.current_m_s:g} m/s, seed 7, {plan.dtype}"
+    )
+    assert title in " ".join(done.stdout.split())
+
+
 def test_means_per_step_are_root_mean_squares(flown):
     table = means_per_step(flown)
     wanted = np.sqrt(np.square(flown.cross_m).mean(axis=0))

@@ -434,6 +434,10 @@ def test_times_in_another_unit_are_the_mappings_to_tell(tmp_path: Path) -> None:
         ("[wishes]\n", "wishes is no file of a log"),
         ('[truth]\ntopic = "row"\nx_m = "x"\n', r"truth.csv has the columns .*, not time_s,x_m"),
         ('[truth]\nx_m = "x"\ny_m = "y"\n', "truth: needs a topic, or a type"),
+        (
+            '[odometry]\ntopic = "a"\nincrements = {x_m = "x", y_m = "y"}\n',
+            "odometry: increments are made of x_m, y_m, heading_rad",
+        ),
         ('[truth]\ntopic = "row"\nx_m = true\ny_m = "y"\n', "truth.x_m: a truth value"),
         ('[truth]\ntopic = "row"\nx_m = {hypot = 1}\ny_m = 0\n', "truth.x_m: hypot takes a list"),
         ('[truth]\ntopic = "row"\nx_m = {field = "x", unit = "in"}\ny_m = 0\n', "unit 'in' is not"),
@@ -450,6 +454,17 @@ def test_mappings_that_are_wrong(tmp_path: Path, mapping: str, message: str) -> 
     assert result.exit_code == 2
     assert re.search(message, result.stderr), result.stderr
     assert not (tmp_path / "log").exists()
+
+
+@pytest.mark.parametrize("field", ["float y!", "float y z", "float[2 y", "float"])
+def test_a_field_of_a_ulog_definition_is_a_type_and_a_name(tmp_path: Path, field: str) -> None:
+    name, raw, _ = recordings()["ulog"]
+    body, made = b"point:float x;float y;", f"point:float x;{field};".encode()
+    whole = struct.pack("<HB", len(body), ord("F")) + body
+    assert raw.count(whole) == 1
+    raw = raw.replace(whole, struct.pack("<HB", len(made), ord("F")) + made)
+    with pytest.raises(LogError, match=re.escape(f"definition of point: {field!r} is no field")):
+        listing(open_recording(written(tmp_path, name, raw)))
 
 
 def test_messages_that_auvest_does_not_know_need_a_mapping(tmp_path: Path) -> None:

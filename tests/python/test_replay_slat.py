@@ -186,6 +186,23 @@ def test_the_page_draws_masters_where_they_are_believed_to_be(tmp_path: Path, na
         np.testing.assert_allclose(x, 30 + 0.5 * np.arange(1, 60, 2), atol=3)
 
 
+@pytest.mark.parametrize("name", ["slatf2", "ekf-slat"])
+def test_the_track_does_not_depend_on_where_the_clock_starts(tmp_path: Path, name: Any) -> None:
+    """Intervals are those of times that are rounded 2^12 s later, by up to 2^-41 s."""
+    sea(tmp_path / "log")
+    before = replay(LogFolder(tmp_path / "log"), settings_from(EXACT), filter_name=name)
+    for path in (tmp_path / "log").glob("*.csv"):
+        header, *lines = path.read_text().splitlines()
+        cells = (line.split(",", 1) for line in lines)
+        later = [f"{float(time) + 4096!r},{rest}" for time, rest in cells]
+        path.write_text("\n".join([header, *later]) + "\n")
+    after = replay(LogFolder(tmp_path / "log"), settings_from(EXACT), filter_name=name)
+    a, b = before.estimates.columns(), after.estimates.columns()
+    np.testing.assert_allclose(b["time_s"], a["time_s"] + 4096, rtol=0, atol=1e-9)
+    for column in ("x_m", "y_m", "heading_rad"):
+        np.testing.assert_allclose(b[column], a[column], rtol=0, atol=1e-6)
+
+
 def test_increments_are_the_velocities_that_they_come_from(tmp_path: Path) -> None:
     sea(tmp_path / "speeds")
     sea(tmp_path / "steps", increments=True)

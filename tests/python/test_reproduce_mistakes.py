@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from conftest import ROOT
 
 from auvest.reproduce.mistakes import measure, page
 from auvest.reproduce.mistakes.injected import MISTAKES
 from auvest.reproduce.mistakes.measure import Bench, Recording, Row
+from auvest.reproduce.mistakes.trials import KINDS
 
 PAGE = ROOT / "docs" / "reproduction" / "mistakes"
 
@@ -53,6 +55,30 @@ def test_a_trial_is_that_of_its_seed(tmp_path: Path) -> None:
         measure.trial("scale", "leaders", seed, tmp_path / folder)
     a, b, c = ((tmp_path / one / "ranges.csv").read_text() for one in "abc")
     assert a == b != c
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"), [(name, kind) for name, one in MISTAKES.items() for kind in one.kinds]
+)
+def test_a_mistake_is_in_the_files_of_its_trial(name: str, kind: str, tmp_path: Path) -> None:
+    measure.trial(measure.CLEAN, kind, 3, tmp_path / "clean")
+    measure.trial(name, kind, 3, tmp_path / "spoiled")
+    clean, spoiled = (
+        {path.name: path.read_text() for path in (tmp_path / one).iterdir()}
+        for one in ("clean", "spoiled")
+    )
+    assert spoiled != clean
+
+
+def test_bearings_and_turns_of_degrees_are_180_over_pi_of_those_in_radians() -> None:
+    for kind, file, column in (
+        ("tracking", "fixes.csv", "bearing_rad"),
+        ("leaders", "odometry.csv", "turn_rad"),
+    ):
+        files = KINDS[kind].make(np.random.default_rng(3))
+        rad = files[file][column].copy()
+        MISTAKES["degrees"].spoil(files, np.random.default_rng(3))
+        np.testing.assert_allclose(files[file][column], rad * 180 / np.pi, rtol=1e-15)
 
 
 def test_the_page_is_what_was_measured_and_every_aim_is_reached() -> None:

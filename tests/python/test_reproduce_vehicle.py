@@ -82,6 +82,16 @@ def test_the_filter_is_consistent_where_its_model_holds(committed):
         assert matched[name] == pytest.approx(due, rel=0.1)
 
 
+def test_bounds_are_those_of_the_runs_that_have_a_value():
+    """Two of 2 degrees of freedom: from 0.484 / 2 to 11.143 / 2, the table's chi-squared of 4."""
+    nan = math.nan
+    values = [[2.0, 0.24, 0.25, 5.5, 50.0], [2.0, 0.24, 0.25, 5.5, nan]]
+    values += [[2.0, nan, nan, nan, nan]] * 2
+    mean, inside = measure._inside(np.array(values), 2)
+    assert mean == pytest.approx((2.0 + 0.24 + 0.25 + 5.5) / 4)  # one of four runs is too few
+    assert inside == 3 / 4
+
+
 def test_the_command_makes_page_and_pictures(tmp_path):
     done = CliRunner().invoke(
         app, ["reproduce", "vehicle", "--runs", "2", "--output", str(tmp_path), "--json"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -185,6 +186,25 @@ def test_a_copy_goes_on_with_the_same_bits_and_alone() -> None:
     one.step(1, [5, 0.5], z, master)
     assert np.array_equal(one.x, two.x)
     assert np.array_equal(one.poses, two.poses)
+
+
+def test_a_filter_in_use_refuses_a_second_thread_whatever_it_asks() -> None:
+    filter_ = with_masters(Slatf(START, CERTAIN, particles=50))
+    asked: dict[str, Callable[[], object]] = {
+        "x": lambda: filter_.x,
+        "P": lambda: filter_.P,
+        "master": lambda: filter_.master(0),
+        "weights": lambda: filter_.weights,
+        "poses": lambda: filter_.poses,
+        "save": filter_.save,
+        "predict": lambda: filter_.predict(1.0, [5.0, 0.5]),
+        "run": lambda: filter_.run(**record(steps=8)),
+    }
+    with ThreadPoolExecutor(1) as pool, filter_._exclusive:
+        why = {name: str(pool.submit(ask).exception()) for name, ask in asked.items()}
+    assert [name for name, said in why.items() if "in use by another thread" not in said] == []
+    for ask in asked.values():
+        ask()
 
 
 def test_the_seed_decides() -> None:

@@ -53,6 +53,15 @@ def test_a_step_that_is_too_long_is_refused_by_name(name):
         FILTERS[name](longest_step_s=0)
 
 
+def test_the_silence_is_on_the_level_that_the_page_names() -> None:
+    """Level 3 of the paper: 1 m and 0.06 rad, with noise of its own."""
+    scenario = robust.locked_out(5, 2, 0.1)
+    assert (scenario.sigma_range_m, scenario.sigma_bearing_rad) == (1, 0.06)
+    assert (scenario.runs, scenario.seed) == (5, 2 + (3 << 60))
+    assert (scenario.silent_from_s, scenario.silent_to_s) == robust.SILENCE_S
+    assert (scenario.plan_known, scenario.doubled) == (False, 0.1)
+
+
 def test_an_outage_that_is_refused_has_not_begun():
     outage = Outage(EkfSlat(START, CERTAIN))
     outage.share(START, CERTAIN, [MASTER])

@@ -242,6 +242,10 @@ def test_a_list_of_points_times_a_grid() -> None:
             "filter.alpah is unknown; known are alph",
         ),
         (changed(SMALL, "fixed", noise=3), "noise"),
+        (
+            {"sweep": {"scenario": "slat"}, "grid": {"masters": [2, 2.5]}},
+            "masters = 2.5: count must be an integer",
+        ),
         (changed(SMALL, "fixed", track="circle"), "track must be 'paper', 'straight' or 'turn'"),
         (changed(SMALL, "grid", **{"interval.policy": ["x"]}), "interval.policy must be 'fixed',"),
         (
@@ -416,6 +420,9 @@ def test_the_command_writes_what_it_shows(tmp_path: Path) -> None:
     for name in ("heat_map", "profiles"):
         assert (out / f"{name}.png").read_bytes().startswith(b"\x89PNG")
         assert b"<svg" in (out / f"{name}.svg").read_bytes()
+    for asked, shown in (((), "rmse_m"), (("--measure", "nis"), "nis")):
+        again = CliRunner().invoke(app, [*arguments, *asked, "--no-figure", "--json", "--quiet"])
+        assert json.loads(again.stdout)["measure"] == shown
     wrong = CliRunner().invoke(app, [*arguments, "--measure", "rsme"])
     assert wrong.exit_code == 2
     assert "measure must be one of rmse_m, nis" in wrong.stderr
@@ -448,7 +455,7 @@ def test_a_folder_of_something_else_is_refused(tmp_path: Path) -> None:
     config.write_text('[sweep]\nscenario = "tracking"\n[grid]\nsteps = [1]\n')
     done = CliRunner().invoke(app, ["sweep", str(config), "--output", str(tmp_path)])
     assert done.exit_code == 2
-    assert "holds what auvest has not written: choose another folder" in done.stderr
+    assert f"{tmp_path} holds what auvest has not written: choose another folder" in done.stderr
     assert sorted(path.name for path in tmp_path.iterdir()) == ["mine.txt", "s.toml"]
 
 

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import itertools
 import json
+import math
 import struct
 import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,6 +22,7 @@ from typer.testing import CliRunner
 from auvest import mission_line, telemetry
 from auvest._core import PilotMode, StatusError
 from auvest.cli import app
+from auvest.commands.mission import _table
 from auvest.simulation import mission, vehicle_in_the_loop
 from auvest.simulation.vehicle_in_the_loop import (
     ChipFlight,
@@ -380,6 +383,45 @@ def test_runs_that_are_flown_are_not_flown_again(
             sketch.write_bytes(b"two")
         call("c", seed=2 if changed == "seed" else 1)
         assert flown == [0, 1, 2], changed
+
+
+def test_each_number_of_a_mission_has_its_row() -> None:
+    counts = ("differing_commands", "commands", "readings_missed", "lines_refused", "implausible")
+    counts += ("late", "damaged_lines", "stack_bytes", "finished_runs", "runs", "samples")
+    values: dict[str, Any] = {name: 11 + k for k, name in enumerate(counts)}
+    for k, name in enumerate(("settled_rms_m", "desk_settled_rms_m", "difference_m", "all_rms_m")):
+        values |= {name: 1.5 + k, f"{name}_se": math.nan if k == 1 else 0.25}
+    values |= {"largest_difference_m": 0.5, "by_rounding_m": 0.0625, "by_delay_m": -0.125}
+    values |= {"position_rms_m": 0.375, "command_delay_s": 0.002, "longest_command_delay_s": 0.003}
+    values |= {"awake_share_simulated": 0.125, "awake_share_by_board": 0.25}
+    made = _table(values, "COM3")
+    assert str(made.title) == "COM3: 19 of 20 runs to the end, 21 samples"
+    rows = [[str(cell) for cell in column.cells] for column in made.columns[:2]]
+    assert dict(zip(*rows, strict=True)) == {
+        "cross-track RMS, settled / m": "1.5000 ± 0.2500",
+        "the same without a chip / m": "2.5000",  # of one run nobody knows an error
+        "difference / m": "3.5000 ± 0.2500",
+        "  largest of a run / m": "0.5000",
+        "  of text rounded / m": "+0.0625",
+        "  of the command's delay / m": "-0.1250",
+        "cross-track RMS, corners too / m": "4.5000 ± 0.2500",
+        "position error of the estimate / m": "0.375",
+        "commands that differ": "11 of 12",
+        "time awake": "12.5 %",
+        "deepest stack / B": "18",
+        "sample to command, mean / ms": "2.0",
+        "longest / ms": "3.0",
+        "readings missed": "13",
+        "lines refused": "14",
+        "readings implausible": "15",
+        "deadlines missed": "16",
+        "lines damaged": "17",
+    }
+    values["awake_share_simulated"] = math.nan  # at a port
+    rows = [[str(cell) for cell in column.cells] for column in _table(values, "COM3").columns[:2]]
+    at_port = dict(zip(*rows, strict=True))
+    assert at_port["time awake"] == "25.0 %"
+    assert "deepest stack / B" not in at_port
 
 
 def test_without_a_board_nothing_is_left(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
