@@ -218,6 +218,10 @@ def test_a_record_that_cannot_be_is_refused() -> None:
         filter_ = auvest.Ekf([0, 0, 0], np.eye(3), **options, **more)
         with pytest.raises(ValueError, match=message):
             Record(filter_, (auvest.LeaderRange(),), *rows, ages)
+    filter_ = auvest.Ekf([0, 0, 0], np.eye(3), **options, dtype="float32")
+    nowhere = (*rows[:-1], np.full((1, 2), np.nan, np.float32))
+    with pytest.raises(ValueError, match=r"^place\[0\] must be given: LeaderRange was made"):
+        Record(filter_, (auvest.LeaderRange(),), *nowhere)
 
 
 def test_late_measurements_of_a_log_are_played_with_their_age(log: Path) -> None:

@@ -72,6 +72,8 @@ class Record:
             raise ValueError(
                 "sensor, dt, z, input, place and age must have the same number of rows"
             )
+        places = self.place if self.place.shape[1] else None
+        filter_._require_standing(self.z, places, list(self.sensors), self.sensor)
 
     def __len__(self) -> int:
         return len(self.dt)
