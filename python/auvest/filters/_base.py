@@ -1142,7 +1142,7 @@ class GaussianFilter:
         z: Floats,
         places: Floats | None,
         used: list[Any],
-        which: npt.NDArray[np.int32] | None,
+        which: npt.NDArray[np.int_ | np.int32] | None,
     ) -> None:
         """Refuse measurements of which neither the record nor the model says from where."""
         for k, one in enumerate(used):
