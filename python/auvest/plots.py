@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -26,9 +26,7 @@ from auvest import metrics
 from auvest._arguments import as_array, as_instance, as_real
 from auvest._core import Decision
 from auvest._outputs import new_file
-
-if TYPE_CHECKING:
-    from auvest.filters.results import RunResult
+from auvest.filters.results import RunResult, RunsResult
 
 Floats = npt.NDArray[np.float64]
 
@@ -474,8 +472,6 @@ def run(
     >>> [axes.get_ylabel() for axes in figure.axes]
     ['y / m', 'x error / m', 'y error / m']
     """
-    from auvest.filters.results import RunResult, RunsResult  # they draw nothing by themselves
-
     as_instance("result", result, RunResult)
     if isinstance(result, RunsResult):
         raise TypeError("result is that of many runs: draw one of them, result.run(0)")
