@@ -22,7 +22,7 @@ import numpy as np
 from rich.console import Console
 from rich.progress import track as progress
 from slat_speed import STEPS, program_time, records, widest_program
-from speed import instructions, rows_of
+from speed import collected, instructions, rows_of
 
 ROOT = Path(__file__).parents[2]
 UKF = ("double", "float")
@@ -71,16 +71,8 @@ def ukf_times(programs: Path) -> dict[str, float]:
 
 def slatf_instructions(program: Path, record: Path, version: int, particles: int) -> float:
     """Give the instructions per particle and step: of two passes more, which only step."""
-    counts = []
-    with tempfile.TemporaryDirectory() as folder:  # for callgrind's own file
-        for passes in ("1", "3"):
-            done = subprocess.run(
-                ["valgrind", "--tool=callgrind", f"--callgrind-out-file={folder}/out",
-                 str(program), str(record), str(version), str(particles), passes],
-                capture_output=True, text=True, check=True,
-            )  # fmt: skip
-            counts.append(int(re.findall(r"Collected : (\d+)", done.stderr)[0]))
-    return (counts[1] - counts[0]) / (2 * RECORDS * STEPS * particles)
+    one, three = (collected(program, record, version, particles, passes) for passes in (1, 3))
+    return (three - one) / (2 * RECORDS * STEPS * particles)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

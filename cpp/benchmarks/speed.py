@@ -264,14 +264,19 @@ def numba_estimates(z: np.ndarray) -> np.ndarray:
 
 def instructions(program: Path, scalar: str, steps: int = 1000) -> float:
     """Return the instructions of one step, counted by callgrind."""
-    command = ["valgrind", "--tool=callgrind", f"--toggle-collect=ukf_step_{scalar}"]
+    return collected(f"--toggle-collect=ukf_step_{scalar}", program, steps) / steps
+
+
+def collected(*command: object) -> int:
+    """Return the instructions that callgrind counts of a program, after options of its own."""
     with tempfile.TemporaryDirectory() as folder:  # for callgrind's own file
-        command += [f"--callgrind-out-file={folder}/out", str(program), str(steps)]
-        run = subprocess.run(command, capture_output=True, text=True, check=True)
+        valgrind = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={folder}/out"]
+        arguments = [*valgrind, *map(str, command)]
+        run = subprocess.run(arguments, capture_output=True, text=True, check=True)
     found = re.search(r"Collected : (\d+)", run.stderr)
     if not found or int(found[1]) == 0:
         raise RuntimeError(f"callgrind collected nothing:\n{run.stderr}")
-    return int(found[1]) / steps
+    return int(found[1])
 
 
 def seconds(function: Callable[..., object], *arguments: object) -> float:

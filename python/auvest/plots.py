@@ -510,7 +510,7 @@ def run(
         sigma = None if S is None else np.sqrt(S[:, 0, 0])
         innovation = result.innovation[:, 0]
         draw_band(upper, time, innovation, sigma, BLUE, "innovation", ".")
-        compress(upper, innovation, 4 * _usual(innovation if sigma is None else 3 * sigma))
+        compress(upper, innovation, 4 * usual(innovation if sigma is None else 3 * sigma))
         style(upper, legend=8.5, ylabel="innovation, first number")
         lower.plot(time, result.nis, ".", color=BLUE, markersize=3)
         compress(lower, result.nis, 2 * metrics.chi2_bounds(result.innovation.shape[1])[1])
@@ -565,11 +565,11 @@ def focus(axes: Axes, bounds: npt.NDArray[Any], values: npt.NDArray[Any]) -> Non
 
 def compress(axes: Axes, values: npt.NDArray[Any], reach: float) -> None:
     """Make the axis logarithmic beyond ``reach``, so that gross errors do not flatten the rest."""
-    if (np.abs(values) > 2 * reach).any():
+    if reach > 0 and (np.abs(values) > 2 * reach).any():
         axes.set_yscale("symlog", linthresh=reach)
 
 
-def _usual(values: npt.NDArray[Any]) -> float:
+def usual(values: npt.NDArray[Any]) -> float:
     """Give what nine of ten values do not exceed, without their signs."""
     known = np.abs(values[np.isfinite(values)])
     return float(np.quantile(known, 0.9)) if len(known) else 0.0

@@ -773,7 +773,7 @@ class GaussianFilter:
         """Take the arguments of :meth:`run`: columns for the core, and its sensors."""
         used, which = self._sensors_used(sensor)
         handles = [self._handle(one) for one in used]
-        record = self._as_columns(z, dt, input, used, which, place, age_s, reference)
+        record = self._as_columns(z, dt, input, used, handles, which, place, age_s, reference)
         self._look_for_degrees(record["z"], record["input"], used, which)
         return record, handles
 
@@ -797,13 +797,13 @@ class GaussianFilter:
         dt: npt.ArrayLike | None,
         input: npt.ArrayLike | None,
         used: list[Any],
+        handles: list[Any],
         which: npt.NDArray[np.int32] | None,
         place: npt.ArrayLike | None,
         age_s: npt.ArrayLike | None,
         reference: npt.ArrayLike | None,
     ) -> dict[str, Any]:
         """Take those of them that have a row per measurement of these sensors."""
-        handles = [self._handle(one) for one in used]
         rows = self._as_measurements(z, handles, which)
         count = len(rows)
         if which is not None and len(which) != count:

@@ -75,13 +75,14 @@ def run_many(
         flat = filter._as_columns(
             stack.reshape(runs * rows, -1),
             used=used,
+            handles=handles,
             which=None if which is None else np.tile(which, runs),
             **{name: _flat(given[name], runs, name in own) for name in given},
         )
     except (ValueError, TypeError):
         for r in range(runs):
             try:
-                filter._as_columns(stack[r], used=used, which=which, **of_run(r))
+                filter._as_columns(stack[r], used=used, handles=handles, which=which, **of_run(r))
             except (ValueError, TypeError) as error:
                 raise type(error)(f"run {r}: {error}") from None
         raise

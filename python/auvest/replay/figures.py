@@ -95,7 +95,7 @@ def _innovation(axes: Axes, result: Result, m: int) -> None:
     if away.any():
         rejected = doubted["time_s"][away], doubted[f"innovation_{m}"][away]
         axes.plot(*rejected, "x", color=colour, markersize=5, label=tables.REJECTED)
-    plots.compress(axes, value, 12 * float(np.quantile(sigma, 0.9)) if len(at) else 1.0)
+    plots.compress(axes, value, 4 * plots.usual(3 * sigma))
     names = ("range / m", "bearing / rad") if ranged.any() else ("x / m", "y / m")
     plots.style(axes, ylabel=names[m])
     _legend(axes)
