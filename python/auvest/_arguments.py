@@ -17,6 +17,8 @@ from typing import Any, Literal, NoReturn, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from auvest._texts import either
+
 Floats: TypeAlias = npt.NDArray[np.floating[Any]]
 DType: TypeAlias = np.dtype[np.float32] | np.dtype[np.float64]
 
@@ -43,8 +45,7 @@ def as_kind(name: str, value: object, kinds: tuple[str, ...]) -> str:
     if not isinstance(value, str):
         raise TypeError(f"{name} must be a str, not {type(value).__name__}")
     if value not in kinds:
-        *first, last = (repr(kind) for kind in kinds)
-        raise ValueError(f"{name} must be {', '.join(first)} or {last}, not {value!r}")
+        raise ValueError(f"{name} must be {either(map(repr, kinds))}, not {value!r}")
     return value
 
 

@@ -1,9 +1,9 @@
-"""Texts with places for numbers, from TOML files of the package."""
+"""Lists in words, and texts with places for numbers from TOML files of the package."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from importlib import resources
 from typing import Any
 
@@ -11,6 +11,12 @@ if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
+
+
+def either(names: Iterable[str]) -> str:
+    """Return "a", "a or b", "a, b or c"."""
+    *others, last = names
+    return f"{', '.join(others)} or {last}" if others else last
 
 
 def read(package: str, name: str) -> dict[str, Any]:

@@ -125,7 +125,9 @@ def filter_named(name: str, among: Iterable[str] | None = None) -> Filter:
     """
     names = list(FILTERS if among is None else among)
     if name not in names:
-        raise ValueError(f"filter must be {', '.join(names[:-1])} or {names[-1]}, not {name!r}")
+        from auvest._texts import either  # here, because --help needs none of it
+
+        raise ValueError(f"filter must be {either(names)}, not {name!r}")
     return FILTERS[name]
 
 

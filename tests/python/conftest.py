@@ -8,7 +8,54 @@ from pathlib import Path
 
 import pytest
 
+from tests.python.kept import FOLDER, difference, same, short
+from tests.python.messages import Messages, neutral, read, watch, write
+
 ROOT = Path(__file__).resolve().parents[2]
+
+#: The messages that have been read.
+KNOWN = pytest.StashKey()
+
+
+def pytest_addoption(parser):
+    """Add what renews the texts that are kept."""
+    parser.addoption("--renew", action="store_true", help="write messages.txt and kept/ anew")
+
+
+@pytest.fixture(scope="session")
+def places(tmp_path_factory):
+    """Return the folders that stand in texts, and what stands for them."""
+    return {str(tmp_path_factory.getbasetemp()): "TMP", str(ROOT): "ROOT"}
+
+
+@pytest.fixture(autouse=True)
+def known_messages(request, monkeypatch, places):
+    """Have every message that the test provokes be one of messages.txt."""
+    messages = Messages(places)
+    watch(monkeypatch, messages)
+    yield
+    known = request.config.stash.setdefault(KNOWN, read())
+    new = [message for message in messages.said if message not in known]
+    if new and request.config.getoption("--renew"):
+        known.update(new)
+        write(known)
+    elif new:
+        pytest.fail("not in messages.txt (--renew adds it):\n" + "\n\n".join(new), pytrace=False)
+
+
+@pytest.fixture
+def kept(request, places):
+    """Return a function that compares a text with the one that is kept under a name."""
+
+    def kept(name, text):
+        path, now = FOLDER / name, short(neutral(text, places))
+        if request.config.getoption("--renew"):
+            path.write_text(now, encoding="utf-8")
+        before = path.read_text(encoding="utf-8")
+        if not same(now, before):
+            pytest.fail(f"{name}:\n{difference(now, before)}", pytrace=False)
+
+    return kept
 
 
 @pytest.fixture(scope="session")

@@ -48,6 +48,18 @@ class Column:
         )  # fmt: skip
         return next((unit for end, unit in units if self.name.endswith(end)), "")
 
+    def suspect(self, value: float) -> tuple[str, str]:
+        """Say in words what a value beyond the limits is a sign of ("": of nothing), and its cause.
+
+        Less than a limit of 0 is no length in millimetres.
+        """
+        if not math.isfinite(value) or value < self.low == 0:
+            code = self.name == "range_m" and math.isfinite(value)
+            return ("a code for 'no echo'?", "no_echo") if code else ("", "unreadable")
+        if self.name == "time_s":
+            return self.suspicion, "milliseconds" if abs(value) < 1e14 else "microseconds"
+        return self.suspicion, self.cause
+
     def takes(self, values: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
         """Say of each value whether it can stand in this column; NaN cannot."""
         good = (values >= self.low) & (values <= self.high)

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from auvest._outputs import is_plain_file
-from auvest.logs.layout import COLUMNS, FILES, Column, match, near
+from auvest.logs.layout import COLUMNS, FILES, match, near
 from auvest.logs.reading import Axes, FileReading, Reading, seconds_of
 
 Rows = npt.NDArray[np.float64]
@@ -467,7 +467,8 @@ class CsvTable:
                 continue
             i = int(np.argmin(good))
             value = float(values[i])
-            hint = f" ({column.suspicion})" if column.suspicion and math.isfinite(value) else ""
+            suspicion, cause = column.suspect(value)
+            hint = f" ({suspicion})" if suspicion else ""
             missing = "; leave out the row where there is no measurement" if value != value else ""
             if self._given[k] in self._reading.units:
                 unit = self._reading.units[self._given[k]]
@@ -477,7 +478,7 @@ class CsvTable:
                 f"{value:.10g} is not {column.expected}{hint}{missing}",
                 line=first + i,
                 column=self._header[self._used[k]].strip(),
-                cause=_cause(column, value),
+                cause=cause,
             )
 
 
@@ -492,15 +493,6 @@ def _digits(cell: str) -> bool:
     """Whether a cell is what a decimal comma leaves of a number."""
     bare = cell.strip().strip('"').lstrip("+-")
     return bare.isdecimal() and bare.isascii()
-
-
-def _cause(column: Column, value: float) -> str:
-    """Say what a value beyond its column's limits is a sign of."""
-    if not math.isfinite(value):
-        return "unreadable"
-    if column.name == "time_s":
-        return "milliseconds" if abs(value) < 1e14 else "microseconds"
-    return column.cause if value > 0 or column.low < 0 else "no_echo"
 
 
 class LogFolder:

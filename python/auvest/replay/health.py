@@ -233,6 +233,22 @@ def _expected(rows: Columns) -> tuple[float, float]:
     return mean, math.sqrt(square)
 
 
+def _share(rows: Columns, inside: npt.NDArray[np.bool_]) -> float:
+    """How large the mean NIS within three sigma is beside that of a consistent filter."""
+    kept = {name: values[inside] for name, values in rows.items()}
+    return float(kept["nis"].mean()) / _expected(kept)[0]
+
+
+def _size(share: float) -> str:
+    """Say in words how large innovations are that are not too large."""
+    if share > 1 / NIS_DOUBTFUL:
+        return "innovations are as large as the settings say"
+    return (
+        f"innovations are {math.sqrt(share):.2g} times as large as the settings say: smaller "
+        "sigmas would make more of the log (auvest calibrate)"
+    )
+
+
 def truncated_moments(numbers: int, limit: float) -> tuple[float, float]:
     """Mean and standard deviation of a chi-square value of one or two numbers below a limit."""
     from scipy.special import chdtr  # here, because it is slow to import
@@ -266,8 +282,7 @@ def findings(residuals: Residuals) -> list[Finding]:
         verdict: Verdict = "not_trusted" if bad else "doubtful"
         found.append(finding("innovations", message, verdict=verdict))
     else:
-        kept = {name: values[inside] for name, values in rows.items()}
-        mean = float(kept["nis"].mean()) / _expected(kept)[0]
+        mean = _share(rows, inside)
         if mean > NIS_DOUBTFUL:
             message = (
                 f"innovations are {math.sqrt(mean):.2g} times as large as the settings say, "
@@ -413,7 +428,7 @@ def health(residuals: Residuals, found: Iterable[Finding]) -> Health:
     reasons = [one.text for one in found if one.verdict == verdict]
     if verdict == "sound":
         few = f"only {count} measurements: hardly anything to judge by"
-        reasons = ["innovations are as large as the settings say" if count >= FEW else few]
+        reasons = [few if count < FEW else _size(_share(rows, within(rows)))]
         if count == 0 and residuals.judged:
             reasons = [f"the gate refused {residuals.refused} of {residuals.judged} echoes"]
     if count == 0:

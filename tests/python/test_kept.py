@@ -1,0 +1,105 @@
+"""What commands print and write, whole, beside what is kept of them (kept.py)."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeAlias
+
+import pytest
+from typer.testing import CliRunner
+
+from auvest.cli import app
+from auvest.replay.toml import settings_text
+from auvest.reproduce.mistakes import measure
+from auvest.reproduce.mistakes.injected import MISTAKES
+from tests.python.test_check import arc
+from tests.python.test_init import recorders
+
+Kept: TypeAlias = Callable[[str, str], None]
+
+#: Lines that are kept of a table: its head and its end tell a column that is another.
+HEAD, END = 3, 2
+
+
+def told(folder: Path, line: str) -> str:
+    """Return what a command prints, and what it writes into ``folder / "out"``."""
+    done = CliRunner().invoke(app, shlex.split(line.replace("OUT", str(folder / "out"))))
+    assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
+    parts = [f"$ auvest {line}", done.stdout + done.stderr, f"exit code {done.exit_code}"]
+    for path in sorted((folder / "out").rglob("*")):
+        if path.suffix in (".json", ".md", ".csv", ".toml") and path.is_file():
+            lines = path.read_text(encoding="utf-8").splitlines()
+            if path.suffix == ".csv" and len(lines) > HEAD + END:
+                lines[HEAD:-END] = [f"... {len(lines)} lines"]
+            parts += [f"\n--- {path.relative_to(folder)}", *lines]
+    return re.sub(r'"version": "[^"]*"', '"version": "VERSION"', "\n".join(parts)) + "\n"
+
+
+SIMULATE = {
+    "aukf": "aukf --runs 3",
+    "aukf_lognormal": "aukf --runs 2 --noise lognormal --dtype float64",
+    "slatf": "slatf --runs 2 --duration 40 --particles 30 --log",
+    "slatf_unknown": "slatf --runs 2 --duration 40 --particles 30 --filter slatf-joint --masters 3 "
+    "--association unknown --outlier 0.1 --gate 16 --plan unknown",
+    "mekf": "mekf --runs 2 --steps 200",
+    "mekf_late": "mekf --runs 2 --steps 200 --filter ukf --kernel hampel --late 0.3 --dropout 0.2 "
+    "--displaced 20",
+    "mission": "mission --runs 2 --track circle --outliers 0.05 --kernel igg",
+}
+
+
+@pytest.mark.parametrize("name", SIMULATE)
+def test_simulations(name: str, tmp_path: Path, kept: Kept) -> None:
+    line = f"simulate {SIMULATE[name]} --no-figure --output OUT"
+    kept(f"simulate_{name}.txt", told(tmp_path, line))
+
+
+REPRODUCE = {
+    "vehicle": "--runs 2",
+    "slat_cases": "--runs 2 --particles 30",
+    "slat_robust": "--runs 8",
+    "constants": "--runs 1",
+}
+
+
+@pytest.mark.parametrize("name", REPRODUCE)
+def test_pages(name: str, tmp_path: Path, kept: Kept) -> None:
+    line = f"reproduce {name.replace('_', '-')} {REPRODUCE[name]} --output OUT"
+    kept(f"reproduce_{name}.txt", told(tmp_path, line))
+
+
+LOGS = {
+    "check": "check LOG",
+    "check_json": "check LOG --json",
+    "init": "init LOG",
+    "replay": "replay LOG --write estimates,measurements,errors --format csv --output OUT",
+    "replay_smooth": "replay LOG --smooth --write estimates --format csv --every 7 --output OUT",
+    "replay_aukf": "replay LOG --filter robust-ukf --kernel hampel --write errors --output OUT",
+    "compare": "compare LOG --filter ekf --filter robust-ukf --output OUT",
+    "calibrate": "calibrate LOG --output OUT",
+}
+
+
+@pytest.mark.parametrize("name", LOGS)
+def test_logs(name: str, tmp_path: Path, kept: Kept) -> None:
+    log = arc(tmp_path / "log", 300)
+    kept(f"log_{name}.txt", told(tmp_path, LOGS[name].replace("LOG", str(log))))
+
+
+def test_logs_of_recorders(tmp_path: Path, kept: Kept) -> None:
+    log = recorders(tmp_path / "log")
+    text = told(tmp_path, f"init {log}")
+    kept("log_recorders.txt", text + (log / "auvest.toml").read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"), [(name, kind) for name, one in MISTAKES.items() for kind in one.kinds]
+)
+def test_mistakes(name: str, kind: str, tmp_path: Path, kept: Kept) -> None:
+    settings = tmp_path / "own.toml"
+    settings.write_text(settings_text(measure.trial(name, kind, 1, tmp_path / "log"), {}))
+    text = told(tmp_path, f"check {tmp_path / 'log'} --config {settings}")
+    kept(f"mistake_{name.replace(' ', '_')}_{kind}.txt", text)
