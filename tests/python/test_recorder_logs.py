@@ -7,6 +7,7 @@ import math
 import os
 import re
 import struct
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ from auvest.importers import (
     recipe,
 )
 from auvest.importers.expressions import expression
+from auvest.importers.recording import flat, nanoseconds, value_of
 from auvest.logs import LogError
 from tests.attacks.recordings import (
     COUNT,
@@ -412,6 +414,8 @@ def quaternion(yaw: float, pitch: float, roll: float) -> tuple[float, float, flo
         ("a", {"a": None}, None),
         ({"hypot": ["a", "b"]}, {"a": 3, "b": -4}, 5),
         ({"hypot": ["a", "b"]}, {"a": 3, "b": None}, None),
+        ({"hypot": ["a"], "scale": 2}, {"a": None}, None),
+        ({"field": "a", "topic": "u"}, {"a": 3}, None),  # nothing came from there
         ({"atan2": ["b", "a"]}, {"a": 1, "b": 1}, math.pi / 4),
         ({"sum": ["a", {"field": "b", "scale": 10}]}, {"a": 1, "b": 2}, 21),
         # North 1, east 2, heading east: ahead is east, and to starboard is south.
@@ -428,6 +432,35 @@ def quaternion(yaw: float, pitch: float, roll: float) -> tuple[float, float, flo
 def test_expressions(given: Any, values: dict[str, Any], expected: float | None) -> None:
     found = expression(given, "here").evaluate(Message("t", 0, values, "line 1"), {})
     assert found == (None if expected is None else pytest.approx(expected, rel=1e-14))
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (math.nan, "here: nan is not a number"),
+        (True, "here: a truth value is no number"),
+        ([1], "here: expected a field, a number or a table, not [1]"),
+        ({}, "here: needs one of field, hypot, atan2, sum, along, across, yaw"),
+        (
+            {"field": "a", "sum": ["a"]},
+            "here: needs one of field, hypot, atan2, sum, along, across, yaw",
+        ),
+        ({"field": 1}, "here: field and topic are names"),
+        ({"field": "a", "topic": 1}, "here: field and topic are names"),
+        ({"field": "a", "missing": True}, "here: missing is True, not a number"),
+        ({"field": "a", "scale": "2"}, "here: scale is '2', not a number"),
+        ({"field": "a", "offset": math.inf}, "here: offset is inf, not a number"),
+        ({"field": "a", "wrap": 1}, "here: wrap is true or false"),
+        ({"sum": ["a"], "topic": "u"}, "here: topic means nothing beside sum"),
+        ({"yaw": ["a"]}, "here: yaw takes a list of 4"),
+        ({"hypot": []}, "here: hypot takes a list of 1 to 4"),
+        ({"sum": [{"atan2": ["a", "b", "c"]}]}, "here.sum: atan2 takes a list of 2"),
+    ],
+)
+def test_what_is_no_expression(given: Any, message: str) -> None:
+    with pytest.raises(MappingError) as refused:
+        expression(given, "here")
+    assert str(refused.value) == message
 
 
 def test_numbers_of_another_topic_are_those_nearest_in_time(tmp_path: Path) -> None:
@@ -534,6 +567,119 @@ def test_mappings_that_are_wrong(tmp_path: Path, mapping: str, message: str) -> 
     assert result.exit_code == 2
     assert re.search(message, result.stderr), result.stderr
     assert not (tmp_path / "log").exists()
+
+
+_BEACON = "source = 0, x_m = 0, y_m = 0"
+
+
+@pytest.mark.parametrize(
+    ("mapping", "message"),
+    [
+        ("period_s = 0\n[truth]\n", "period_s is 0, not seconds above 0"),
+        ("period_s = 'x'\n[truth]\n", "period_s is 'x', not seconds above 0"),
+        ("truth = 5\n", "truth: expected a table"),
+        ("[truth]\ntopic = 5\n", "truth: topic is not what it must be"),
+        (f"[beacons]\nrows = [{{{_BEACON}}}]\nfresh = true\n", "beacons: rows stand alone"),
+        (f"[beacons]\nrows = [{{{_BEACON}}}]\nx_m = 1\n", "beacons: rows stand alone"),
+        ('[truth]\ntopic = "a"\nbeside = "fixes"\n', "truth: beside and unless are for rows"),
+        ('[truth]\ntopic = "a"\nunless = "fixes"\n', "truth: beside and unless are for rows"),
+        (
+            f'[beacons]\nrows = [{{{_BEACON}}}]\nunless = "wishes"\n',
+            "beacons: wishes is no file of a log",
+        ),
+        (
+            f"[beacons]\nrows = [{{{_BEACON}}}, {{source = 1, x_m = 0}}]\n",
+            "beacons: rows have the same columns",
+        ),
+        ('[truth]\ntopic = "a"\ntype = "b"\n', "truth: needs a topic, or a type"),
+    ],
+)
+def test_mappings_are_refused_before_a_recording_is_read(
+    tmp_path: Path, mapping: str, message: str
+) -> None:
+    path = written(tmp_path, "mapping.toml", mapping)
+    with pytest.raises(MappingError) as refused:
+        read_mapping(path)
+    assert str(refused.value) == f"{path}: {message}"
+
+
+def test_a_mapping_is_a_file(tmp_path: Path) -> None:
+    missing = tmp_path / "none.toml"
+    for path, message in (
+        (tmp_path, f"{tmp_path} is not a file"),
+        (
+            missing,
+            f"{missing} cannot be read: [Errno 2] No such file or directory: {str(missing)!r}",
+        ),
+    ):
+        with pytest.raises(MappingError) as refused:
+            read_mapping(path)
+        assert str(refused.value) == message
+
+
+def test_one_of_several_values_of_a_field(tmp_path: Path) -> None:
+    """A number is no truth value: 1 is not true."""
+    path = written(tmp_path, "a.csv", "t,x,y\n1,2,3\n2,4,3\n3,5,6\n4,true,6\n5,1,6\n")
+    mapping = '[truth]\ntopic = "row"\nwhen = {x = [2, 5, true]}\nx_m = "t"\ny_m = "y"\n'
+    assert log_of(tmp_path, path, mapping) == {"truth.csv": [[1, 1, 3], [3, 3, 6], [4, 4, 6]]}
+
+
+def test_two_tables_of_one_file_have_the_same_columns(tmp_path: Path) -> None:
+    path = written(tmp_path, "a.csv", "t,x,y\n1,2,3\n")
+    mapping = (
+        '[[positions]]\ntopic = "row"\nx_m = "x"\ny_m = "y"\n'
+        '[[positions]]\ntopic = "row"\nlatitude_deg = "x"\nlongitude_deg = "y"\n'
+    )
+    with pytest.raises(MappingError) as refused:
+        log_of(tmp_path, path, mapping)
+    assert str(refused.value) == "positions.csv is given different columns by two tables"
+
+
+def test_a_recording_without_stamps_has_none(tmp_path: Path) -> None:
+    path = written(tmp_path, "a.csv", "t,x,y\n1,2,3\n")
+    with pytest.raises(LogError) as refused:
+        log_of(tmp_path, path, 'clock = "stamp"\n[truth]\ntopic = "row"\nx_m = "x"\ny_m = "y"\n')
+    assert str(refused.value) == (
+        f'{path}, line 2: row has no stamp; in a mapping, clock = "recorded" takes the time of '
+        "the recording"
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("", None), (" NaN ", None), ("true", True), ("True", True), ("False", False),
+        ("false", False), ("+7", 7), ("-.5", -0.5), ("1_0", "1_0"), ("1e400", "1e400"),
+        ("123456789012345678", 123456789012345678), ("1234567890123456789", 1234567890123456800.0),
+    ],
+)  # fmt: skip
+def test_a_cell_is_taken_for_what_it_is(text: str, expected: Any) -> None:
+    found = value_of(text)
+    assert found == expected
+    assert type(found) is type(expected)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "expected"),
+    [
+        ("1.5", 1_500_000_000), ("-1e-9", -1), ("0.0000000019", 1), ("1e9999", None), ("x", None),
+        ("100000000000", 10**20), ("100000000000.000000001", None), ("1" * 41, None),
+    ],
+)  # fmt: skip
+def test_nanoseconds_of_what_is_written(seconds: str, expected: int | None) -> None:
+    assert nanoseconds(seconds) == expected
+
+
+def test_parts_and_lists_have_names() -> None:
+    """A list of more than 64 is a length; what JSON has not is its text."""
+    tree = {
+        "at": {"x": 1.5, "of": [1, None, {"k": "a"}]}, "on": date(2022, 8, 9),
+        "beams": list(range(65)), "few": list(range(64)),
+    }  # fmt: skip
+    assert flat(tree) == {
+        "at.x": 1.5, "at.of[0]": 1, "at.of[1]": None, "at.of[2].k": "a", "on": "2022-08-09",
+        "beams.length": 65, **{f"few[{k}]": k for k in range(64)},
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize("field", ["float y!", "float y z", "float[2 y", "float"])
@@ -801,6 +947,13 @@ def test_a_missing_package_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     result = call("import", "--list", path)
     assert result.exit_code == 2
     assert "pip install 'auvest[ros]'" in result.stderr
+
+
+def test_a_recording_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "none.csv"
+    with pytest.raises(LogError) as refused:
+        open_recording(path)
+    assert str(refused.value) == f"{path}: cannot be read: No such file or directory"
 
 
 def test_mapping_errors_are_no_log_errors() -> None:
