@@ -266,6 +266,23 @@ def test_what_no_log_can_hold_is_refused_and_leaves_nothing(
     assert [path.name for path in tmp_path.iterdir()] == ["goats14"]
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("20.0,9.0,", "20.0,-9.0,", ", line 3, column leader_pos_var: a variance of -9"),
+        ("20.0,9.0,", "20.0,,", ", line 3: a cell is empty"),
+    ],
+)
+def test_a_variance_is_a_number_and_not_below_0(
+    tmp_path: Path, old: str, new: str, message: str
+) -> None:
+    files = {**HAT, "leader_ranges.csv": HAT["leader_ranges.csv"].replace(old, new)}
+    with pytest.raises(LogError) as refused:
+        imported(tmp_path, "hat_charles", files)
+    assert str(refused.value) == f"{tmp_path / 'hat_charles' / 'leader_ranges.csv'}{message}"
+    assert [path.name for path in tmp_path.iterdir()] == ["hat_charles"]
+
+
 def test_tables_may_begin_with_a_mark(tmp_path: Path) -> None:
     files = {name: "\ufeff" + text for name, text in goats(0.25).items()}
     log = imported(tmp_path, "goats14", files)["goats14"]

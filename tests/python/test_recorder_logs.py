@@ -7,6 +7,7 @@ import math
 import os
 import re
 import struct
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ from auvest.importers import (
     recipe,
 )
 from auvest.importers.expressions import expression
+from auvest.importers.recording import flat, nanoseconds, value_of
 from auvest.logs import LogError
 from tests.attacks.recordings import (
     COUNT,
@@ -74,6 +76,23 @@ def log_of(folder: Path, path: Path, mapping: str | None = None) -> dict[str, li
         file.name: np.loadtxt(file, delimiter=",", skiprows=1, ndmin=2).tolist()
         for file in log.path.glob("*.csv")
     }
+
+
+def ulog(*parts: tuple[str, bytes]) -> bytes:
+    """A ULog of these messages, by their letters."""
+    head = b"ULog\x01\x12\x35\x01" + bytes(8)
+    return head + b"".join(struct.pack("<HB", len(body), ord(kind)) + body for kind, body in parts)
+
+
+def subscribed(*definitions: bytes, name: bytes = b"p") -> bytes:
+    """A ULog of definitions, and a subscription to one of them as number 7."""
+    return ulog(*(("F", one) for one in definitions), ("A", b"\2" + struct.pack("<H", 7) + name))
+
+
+def fmt(kind: int, name: str, letters: str, columns: str, size: int) -> bytes:
+    """FMT of DataFlash; 89 bytes."""
+    texts = name.encode(), letters.encode(), columns.encode()
+    return b"\xa3\x95\x80" + struct.pack("<BB4s16s64s", kind, size + 3, *texts)
 
 
 def messages(path: Path) -> list[Message]:
@@ -256,6 +275,48 @@ def test_padding_at_the_end_of_ulog_data_is_not_there(tmp_path: Path) -> None:
     assert first.values == {"timestamp": 100_000_000, "at.x": 1.0, "at.y": 2.0, "valid": True}
 
 
+def test_types_lists_and_texts_of_a_ulog(tmp_path: Path) -> None:
+    """A list has an index, a text ends at its zero, and what is not finite is missing.
+
+    Of a long list the first 64 are kept; padding within is passed over; a definition that comes
+    again as it was is no other.
+    """
+    inner, outer = (
+        b"q:int16_t v;uint8_t[1] _padding0;",
+        b"p:uint64_t timestamp;q[2] at;char[4] name;float w;double u;uint8_t[66] many;",
+    )
+    body = b"\7\0" + struct.pack("<Qh1xh1x4sfd66B", 5, -3, 4, b"ab\0c", math.nan, 1.5, *range(66))
+    key = b"char[5] ver_hw"
+    other = b"char[3] sys_uuid"
+    raw = ulog(
+        ("B", bytes(8) + b"\1" + bytes(31)),  # data were appended, which is read on the way
+        ("I", bytes([len(key)]) + key + b"V6C00"),
+        ("I", bytes([len(other)]) + other + b"abc"),
+        ("I", b""),
+        *(("F", one) for one in (inner, outer, outer)),
+        ("A", b"\2\7\0p"), ("O", b"\5\0"), ("D", body), ("O", b"\6\0"),
+    )  # fmt: skip
+    recording = open_recording(written(tmp_path, "dive.ulg", raw))
+    (message,) = recording.messages()
+    assert message.values == {
+        "timestamp": 5, "at[0].v": -3, "at[1].v": 4, "name": "ab", "w": None, "u": 1.5,
+        **{f"many[{k}]": k for k in range(64)},
+    }  # fmt: skip
+    assert (message.topic, message.time_ns) == ("p_2", 5000)
+    assert recording.facts == {"start_us": 0, "ver_hw": "V6C00", "dropouts": 2}
+    assert list(recording.messages(("p_1",))) == []
+
+
+@pytest.mark.parametrize("rest", [b"\xfd\1\0\0", b"\xfe\1\0\1", b""])
+def test_a_packet_that_is_cut_in_its_head_is_counted(tmp_path: Path, rest: bytes) -> None:
+    whole = packet(5, 173, 83, struct.pack("<ff", 2.5, math.inf))
+    recording = open_recording(written(tmp_path, "a.tlog", whole + bytes(8) + rest))
+    (message,) = recording.messages()
+    assert message.values == {"distance": 2.5, "voltage": None}
+    assert recording.skipped == {"packet cut by the end of the file": 1}
+    assert recording.facts == {"packets": 1}
+
+
 def test_numbers_whose_sum_is_none_have_no_mean(tmp_path: Path) -> None:
     path = written(tmp_path, "a.csv", "t,x\n1,1e308\n2,1e308\n")
     found = listing(open_recording(path))["topics"]["row"]["fields"]["x"]
@@ -278,6 +339,11 @@ def test_nmea_times(tmp_path: Path) -> None:
     assert times("2022-08-08T12:00:00+02:00") == [1659952800 * 10**9]
     assert times("2022-08-08T08:30:00-01:30") == [1659952800 * 10**9]
     assert times("2022-08-08 10:00:00,25Z") == [1659952800 * 10**9 + 250_000_000]
+    assert times("2022-08-08T12:00:00+0200") == [1659952800 * 10**9]
+    assert times("12:00:60.5") == [43260 * 10**9 + 500_000_000]  # a leap second
+    # What is no time is none, and a day without a date stays one: no Unix time in between.
+    assert times("24:00:00", "12:60:00", "12:00:61", "2022-13-08 12:00:00") == [None] * 4
+    assert times("00:00:01", "1659952800", "00:00:03") == [10**9, None, 3 * 10**9]
     assert times("1659952800.125:") == [1659952800 * 10**9 + 125_000_000]
 
 
@@ -301,6 +367,22 @@ def test_nmea_says_how_it_is_read(tmp_path: Path) -> None:
         "sentence without a checksum": 1,
         "encapsulated sentence": 1,
     }
+
+
+def test_nmea_dates(tmp_path: Path) -> None:
+    """Of RMC, or ZDA's numbers; the latest stays where a sentence has none, or one that is none."""
+    lines = [
+        sentence(line)
+        for line in (
+            "GPGGA,000010,4830.6,N,00433.5,W,1", "GPZDA,000020,07,08,2022,00,00",
+            "GPZDA,000030,31,02,2022,00,00", "GPRMC,000040,A,,,,,,,080822,,",
+            "GPRMC,000050,A,,,,,,,320822,,",
+        )
+    ]  # fmt: skip
+    path = written(tmp_path, "nmea.txt", "\n".join(lines) + "\n")
+    assert [message.stamp_ns for message in messages(path)] == [
+        None, *((1659916800 + s) * 10**9 for s in (20 - 86400, 30 - 86400, 40, 50)),
+    ]  # fmt: skip
 
 
 def quaternion(yaw: float, pitch: float, roll: float) -> tuple[float, float, float, float]:
@@ -332,6 +414,8 @@ def quaternion(yaw: float, pitch: float, roll: float) -> tuple[float, float, flo
         ("a", {"a": None}, None),
         ({"hypot": ["a", "b"]}, {"a": 3, "b": -4}, 5),
         ({"hypot": ["a", "b"]}, {"a": 3, "b": None}, None),
+        ({"hypot": ["a"], "scale": 2}, {"a": None}, None),
+        ({"field": "a", "topic": "u"}, {"a": 3}, None),  # nothing came from there
         ({"atan2": ["b", "a"]}, {"a": 1, "b": 1}, math.pi / 4),
         ({"sum": ["a", {"field": "b", "scale": 10}]}, {"a": 1, "b": 2}, 21),
         # North 1, east 2, heading east: ahead is east, and to starboard is south.
@@ -348,6 +432,35 @@ def quaternion(yaw: float, pitch: float, roll: float) -> tuple[float, float, flo
 def test_expressions(given: Any, values: dict[str, Any], expected: float | None) -> None:
     found = expression(given, "here").evaluate(Message("t", 0, values, "line 1"), {})
     assert found == (None if expected is None else pytest.approx(expected, rel=1e-14))
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (math.nan, "here: nan is not a number"),
+        (True, "here: a truth value is no number"),
+        ([1], "here: expected a field, a number or a table, not [1]"),
+        ({}, "here: needs one of field, hypot, atan2, sum, along, across, yaw"),
+        (
+            {"field": "a", "sum": ["a"]},
+            "here: needs one of field, hypot, atan2, sum, along, across, yaw",
+        ),
+        ({"field": 1}, "here: field and topic are names"),
+        ({"field": "a", "topic": 1}, "here: field and topic are names"),
+        ({"field": "a", "missing": True}, "here: missing is True, not a number"),
+        ({"field": "a", "scale": "2"}, "here: scale is '2', not a number"),
+        ({"field": "a", "offset": math.inf}, "here: offset is inf, not a number"),
+        ({"field": "a", "wrap": 1}, "here: wrap is true or false"),
+        ({"sum": ["a"], "topic": "u"}, "here: topic means nothing beside sum"),
+        ({"yaw": ["a"]}, "here: yaw takes a list of 4"),
+        ({"hypot": []}, "here: hypot takes a list of 1 to 4"),
+        ({"sum": [{"atan2": ["a", "b", "c"]}]}, "here.sum: atan2 takes a list of 2"),
+    ],
+)
+def test_what_is_no_expression(given: Any, message: str) -> None:
+    with pytest.raises(MappingError) as refused:
+        expression(given, "here")
+    assert str(refused.value) == message
 
 
 def test_numbers_of_another_topic_are_those_nearest_in_time(tmp_path: Path) -> None:
@@ -456,6 +569,119 @@ def test_mappings_that_are_wrong(tmp_path: Path, mapping: str, message: str) -> 
     assert not (tmp_path / "log").exists()
 
 
+_BEACON = "source = 0, x_m = 0, y_m = 0"
+
+
+@pytest.mark.parametrize(
+    ("mapping", "message"),
+    [
+        ("period_s = 0\n[truth]\n", "period_s is 0, not seconds above 0"),
+        ("period_s = 'x'\n[truth]\n", "period_s is 'x', not seconds above 0"),
+        ("truth = 5\n", "truth: expected a table"),
+        ("[truth]\ntopic = 5\n", "truth: topic is not what it must be"),
+        (f"[beacons]\nrows = [{{{_BEACON}}}]\nfresh = true\n", "beacons: rows stand alone"),
+        (f"[beacons]\nrows = [{{{_BEACON}}}]\nx_m = 1\n", "beacons: rows stand alone"),
+        ('[truth]\ntopic = "a"\nbeside = "fixes"\n', "truth: beside and unless are for rows"),
+        ('[truth]\ntopic = "a"\nunless = "fixes"\n', "truth: beside and unless are for rows"),
+        (
+            f'[beacons]\nrows = [{{{_BEACON}}}]\nunless = "wishes"\n',
+            "beacons: wishes is no file of a log",
+        ),
+        (
+            f"[beacons]\nrows = [{{{_BEACON}}}, {{source = 1, x_m = 0}}]\n",
+            "beacons: rows have the same columns",
+        ),
+        ('[truth]\ntopic = "a"\ntype = "b"\n', "truth: needs a topic, or a type"),
+    ],
+)
+def test_mappings_are_refused_before_a_recording_is_read(
+    tmp_path: Path, mapping: str, message: str
+) -> None:
+    path = written(tmp_path, "mapping.toml", mapping)
+    with pytest.raises(MappingError) as refused:
+        read_mapping(path)
+    assert str(refused.value) == f"{path}: {message}"
+
+
+def test_a_mapping_is_a_file(tmp_path: Path) -> None:
+    missing = tmp_path / "none.toml"
+    for path, message in (
+        (tmp_path, f"{tmp_path} is not a file"),
+        (
+            missing,
+            f"{missing} cannot be read: [Errno 2] No such file or directory: {str(missing)!r}",
+        ),
+    ):
+        with pytest.raises(MappingError) as refused:
+            read_mapping(path)
+        assert str(refused.value) == message
+
+
+def test_one_of_several_values_of_a_field(tmp_path: Path) -> None:
+    """A number is no truth value: 1 is not true."""
+    path = written(tmp_path, "a.csv", "t,x,y\n1,2,3\n2,4,3\n3,5,6\n4,true,6\n5,1,6\n")
+    mapping = '[truth]\ntopic = "row"\nwhen = {x = [2, 5, true]}\nx_m = "t"\ny_m = "y"\n'
+    assert log_of(tmp_path, path, mapping) == {"truth.csv": [[1, 1, 3], [3, 3, 6], [4, 4, 6]]}
+
+
+def test_two_tables_of_one_file_have_the_same_columns(tmp_path: Path) -> None:
+    path = written(tmp_path, "a.csv", "t,x,y\n1,2,3\n")
+    mapping = (
+        '[[positions]]\ntopic = "row"\nx_m = "x"\ny_m = "y"\n'
+        '[[positions]]\ntopic = "row"\nlatitude_deg = "x"\nlongitude_deg = "y"\n'
+    )
+    with pytest.raises(MappingError) as refused:
+        log_of(tmp_path, path, mapping)
+    assert str(refused.value) == "positions.csv is given different columns by two tables"
+
+
+def test_a_recording_without_stamps_has_none(tmp_path: Path) -> None:
+    path = written(tmp_path, "a.csv", "t,x,y\n1,2,3\n")
+    with pytest.raises(LogError) as refused:
+        log_of(tmp_path, path, 'clock = "stamp"\n[truth]\ntopic = "row"\nx_m = "x"\ny_m = "y"\n')
+    assert str(refused.value) == (
+        f'{path}, line 2: row has no stamp; in a mapping, clock = "recorded" takes the time of '
+        "the recording"
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("", None), (" NaN ", None), ("true", True), ("True", True), ("False", False),
+        ("false", False), ("+7", 7), ("-.5", -0.5), ("1_0", "1_0"), ("1e400", "1e400"),
+        ("123456789012345678", 123456789012345678), ("1234567890123456789", 1234567890123456800.0),
+    ],
+)  # fmt: skip
+def test_a_cell_is_taken_for_what_it_is(text: str, expected: Any) -> None:
+    found = value_of(text)
+    assert found == expected
+    assert type(found) is type(expected)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "expected"),
+    [
+        ("1.5", 1_500_000_000), ("-1e-9", -1), ("0.0000000019", 1), ("1e9999", None), ("x", None),
+        ("100000000000", 10**20), ("100000000000.000000001", None), ("1" * 41, None),
+    ],
+)  # fmt: skip
+def test_nanoseconds_of_what_is_written(seconds: str, expected: int | None) -> None:
+    assert nanoseconds(seconds) == expected
+
+
+def test_parts_and_lists_have_names() -> None:
+    """A list of more than 64 is a length; what JSON has not is its text."""
+    tree = {
+        "at": {"x": 1.5, "of": [1, None, {"k": "a"}]}, "on": date(2022, 8, 9),
+        "beams": list(range(65)), "few": list(range(64)),
+    }  # fmt: skip
+    assert flat(tree) == {
+        "at.x": 1.5, "at.of[0]": 1, "at.of[1]": None, "at.of[2].k": "a", "on": "2022-08-09",
+        "beams.length": 65, **{f"few[{k}]": k for k in range(64)},
+    }  # fmt: skip
+
+
 @pytest.mark.parametrize("field", ["float y!", "float y z", "float[2 y", "float"])
 def test_a_field_of_a_ulog_definition_is_a_type_and_a_name(tmp_path: Path, field: str) -> None:
     name, raw, _ = recordings()["ulog"]
@@ -504,35 +730,114 @@ def test_rows_that_depend_on_other_files(tmp_path: Path) -> None:
 # ---- What is refused -----------------------------------------------------------------------------
 
 
+_V1 = b"\xfe\x01\0\1\1\x45\0\0\0"  # a packet of message 69
+
+
 @pytest.mark.parametrize(
     ("name", "raw", "message"),
     [
-        ("a.csv", "t,x\n1,2\n1,2", r"a.csv, line 3: does not end with a line end: truncated"),
-        ("a.csv", "t,x\n1,2,3\n", r"a.csv, line 2: 3 cells, expected 2"),
-        ("a.csv", "t,x\n\n1,2\n", r"a.csv, line 2: is blank, and rows follow"),
-        ("a.csv", "t,x\n1e400,2\n", r"a.csv, line 2: t is '1e400', which is no time in s"),
-        ("a.csv", "t,t\n1,2\n", r"a.csv, line 1: has the column t twice"),
-        ("a.csv", "1,2\n3,4\n", r"a.csv, line 1: '1' is not the name of a column"),
-        ("a.json", '{"vx": 1', r"a.json, line 1: is not JSON"),
-        ("a.json", '{"vx": 1e999}\n', r"a.json, line 1: is not JSON: 1e999 is not a number"),
-        ("a.json", '{"vx": ' + "9" * 400 + "}\n", r"a.json, line 1: is not JSON: 9+ is not a num"),
-        ("a.json", '{"vx": 1, "time": -5}\n', r"a.json, line 1: time is -5, which are no mill"),
-        ("a.alog", "%% LOGSTART 1\n1 X\n", r"a.alog, line 2: 2 words; expected time"),
-        ("a.alog", "%% LOGSTART 1\nnan X p 1\n", r"a.alog, line 2: 'nan' is no time in s"),
-        ("a.txt", sentence("GPGGA,100140,9830.6,N,1,E,1") + "\n", r"a.txt, line 1: '9830.6,N' is"),
-        ("a.txt", sentence("GPGGA,106140,,,,,1") + "\n", r"a.txt, line 1: '106140' is no time"),
-        ("a.txt", "$PAZM3,1,0", r"a.txt, line 1: PAZM3 has no checksum, and the line no end"),
-        ("a.bin", b"\xa3\x95\x81abc", r"a.bin, byte 0: message 129 is not described by any FMT"),
-        ("a.tlog", b"\0" * 8 + b"\x55" * 20, r"a.tlog, byte 0: no packet begins here"),
-        ("a.ulg", b"ULog\x01\x12\x35\x09" + bytes(8), r"a.ulg, byte 7: version 9 is not known"),
-        ("a.xyz", b"\x00\x01", r"a.xyz: is of no format known here"),
+        ("a.csv", "t,x\n1,2\n1,2", "line 3: does not end with a line end: truncated"),
+        ("a.csv", "t,x\n1,2,3\n", "line 2: 3 cells, expected 2: truncated?"),
+        ("a.csv", "t,x\n\n1,2\n", "line 2: is blank, and rows follow"),
+        ("a.csv", "t,x\n1e400,2\n", "line 2: t is '1e400', which is no time in s"),
+        ("a.csv", "t,t\n1,2\n", "line 1: has the column t twice"),
+        ("a.csv", "1,2\n3,4\n", "line 1: '1' is not the name of a column"),
+        ("a.csv", "t, ,x\n1,2,3\n", "line 1: '' is not the name of a column"),
+        ("a.csv", 't,"x\n', "line 1: is no row of cells: unexpected end of data"),
+        ("a.csv", b"t,x\n1,\xff\n", "line 2: is not UTF-8 text"),
+        ("a.csv", "t,x\n1," + "2" * (1 << 20) + "\n", "line 2: is longer than 1048576 bytes"),
+        ("a.json", '{"vx": 1', "line 1: is not JSON: Expecting ',' delimiter: line 1 column 9 "
+         "(char 8)"),
+        ("a.json", '{"vx": 1e999}\n', "line 1: is not JSON: 1e999 is not a number"),
+        ("a.json", '{"vx": ' + "9" * 400 + "}\n",
+         f"line 1: is not JSON: {'9' * 40} is not a number"),
+        ("a.json", '{"vx": 1}\n\n[5]\n', "line 3: is not a JSON object"),
+        ("a.json", '{"vx": 1, "time": -5}\n', "line 1: time is -5, which are no milliseconds"),
+        ("a.json", '{"vx": 1, "time": true}\n', "line 1: time is True, which are no milliseconds"),
+        ("a.alog", "%% LOGSTART 1\n1 X\n",
+         "line 2: 2 words; expected time, variable, source, value"),
+        ("a.alog", "%% LOGSTART 1\nnan X p 1\n", "line 2: 'nan' is no time in s"),
+        ("a.alog", "%% LOGSTART 1e30\n1 X p 1\n",
+         "line 1: LOGSTART is '1e30', which is no time"),
+        ("a.alog", "%% LOGSTART 1\n\n1 X p 1", "line 3: does not end with a line end: truncated"),
+        ("a.txt", sentence("GPGGA,100140,9830.6,N,1,E,1") + "\n",
+         "line 1: '9830.6,N' is no latitude"),
+        ("a.txt", sentence("GPGGA,100140,4830.6,N,18000.6,E,1") + "\n",
+         "line 1: '18000.6,E' is no longitude"),
+        ("a.txt", sentence("GPGGA,106140,,,,,1") + "\n", "line 1: '106140' is no time of the day"),
+        ("a.txt", "$PAZM3,1,0", "line 1: PAZM3 has no checksum, and the line no end: truncated"),
+        ("a.txt", sentence("HEHDT,1.5,T") + " more\n", "line 1: 'more' after the sentence HEHDT"),
+        ("a.bin", b"\xa3\x95\x81abc", "byte 0: message 129 is not described by any FMT"),
+        ("a.bin", fmt(129, "A", "B", "N", 1) + b"\xa3\x96\x81\1",
+         "byte 89: no message begins here"),
+        ("a.bin", fmt(129, "A", "B", "N", 1) + fmt(129, "A", "B", "M", 1),
+         "byte 89: message 129 is described twice"),
+        ("a.bin", fmt(129, "", "B", "N", 1), "byte 0: FMT gives message 129 no name"),
+        ("a.bin", fmt(129, "A", "B", "N\n", 1), "byte 0: FMT gives message 129 no name"),
+        ("a.bin", fmt(129, "A", "BB", "N", 2),
+         "byte 0: FMT of A: 'BB' does not describe 1 columns"),
+        ("a.bin", fmt(129, "A", "?", "N", 1), "byte 0: FMT of A: '?' does not describe 1 columns"),
+        ("a.bin", fmt(129, "A", "BB", "N,N", 2),
+         "byte 0: FMT of A: columns without a name of their own"),
+        ("a.bin", fmt(129, "A", "BB", "N,", 2),
+         "byte 0: FMT of A: columns without a name of their own"),
+        ("a.bin", fmt(129, "A", "BH", "N,M", 4),
+         "byte 0: FMT of A: its columns take 6 bytes, not 7"),
+        ("a.bin", fmt(128, "A", "B", "N", 1), "byte 0: FMT describes itself as something else"),
+        ("a.bin", fmt(129, "A", "Q", "TimeUS", 8) + b"\xa3\x95\x81" + b"\xff" * 8,
+         "byte 89: TimeUS is 18446744073709551615, which is no time"),
+        ("a.tlog", b"\0" * 8 + b"\x55" * 20, "byte 0: no packet begins here"),
+        ("a.tlog", b"\xff" * 8 + _V1, "byte 0: 18446744073709551615 us is no time"),
+        ("a.tlog", packet(5, 69, 0, b"\1") + b"\0" * 8 + b"\xfd\1\2" + b"\0" * 20,
+         "byte 21: a packet with flags 0x2, not known here"),
+        ("a.tlog", packet(5, 173, 83, bytes(9), version=1),
+         "byte 0: RANGEFINDER of 9 bytes, at most 8"),
+        ("a.ulg", b"ULog\x01\x12\x35\x09" + bytes(8), "byte 7: version 9 is not known here"),
+        ("a.ulg", b"ULog\x01\x12\x35\x01", "byte 0: is too short for a ULog"),
+        ("a.ulg", ulog(("x", b"")), "byte 16: 'x' is no kind of message"),
+        ("a.ulg", ulog(("B", bytes(39))), "byte 16: flags of 39 bytes, expected 40"),
+        ("a.ulg", ulog(("B", bytes(8) + b"\2" + bytes(31))),
+         "byte 16: has features that are not known here"),
+        ("a.ulg", ulog(("B", bytes(15) + b"\1" + bytes(24))),
+         "byte 16: has features that are not known here"),
+        ("a.ulg", ulog(("F", b"p float x;")), "byte 16: is no definition"),
+        ("a.ulg", ulog(("F", b"p!:float x;")), "byte 16: is no definition"),
+        ("a.ulg", ulog(("F", b"p:float x;"), ("F", b"p:float y;")), "byte 29: p is defined twice"),
+        ("a.ulg", ulog(("A", b"\0\1\0")), "byte 16: is too short for a subscription"),
+        ("a.ulg", ulog(("A", b"\0\1\0p")), "byte 16: 'p' is not defined before it is logged"),
+        ("a.ulg", subscribed(b"p:float x;"), "byte 29: p has no timestamp"),
+        ("a.ulg", subscribed(b"p:p x;"), "byte 25: p is defined by itself, or too long"),
+        ("a.ulg", subscribed(b"p:real x;"), "byte 28: p: 'real' is no type"),
+        ("a.ulg", subscribed(b"p:float[65537] x;"), "byte 36: p is longer than a message"),
+        ("a.ulg", ulog(("D", b"\7")), "byte 16: is too short for data"),
+        ("a.ulg", ulog(("D", b"\7\0")), "byte 16: data of 7, which nothing has named"),
+        ("a.ulg", subscribed(b"p:uint64_t timestamp;") + ulog(("D", b"\7\0" + bytes(7)))[16:],
+         "byte 47: p_2: 7 bytes, expected 8"),
+        ("a.ulg", subscribed(b"p:uint64_t timestamp;") + ulog(("D", b"\7\0" + b"\xff" * 8))[16:],
+         "byte 47: p_2: its timestamp is 18446744073709551615, which is no time"),
     ],
-)
+)  # fmt: skip
 def test_what_does_not_follow_its_format_is_refused_by_its_place(
     tmp_path: Path, name: str, raw: bytes | str, message: str
 ) -> None:
-    with pytest.raises(LogError, match=message):
-        listing(open_recording(written(tmp_path, name, raw)))
+    path = written(tmp_path, name, raw)
+    with pytest.raises(LogError) as refused:
+        listing(open_recording(path))
+    assert str(refused.value) == f"{path}, {message}"
+
+
+def test_what_is_of_no_format_is_refused(tmp_path: Path) -> None:
+    """A CSV file that is named as one but has only blank lines has no header."""
+    path = written(tmp_path, "a.xyz", "\n\n")
+    with pytest.raises(LogError) as refused:
+        open_recording(path)
+    assert str(refused.value) == (
+        f"{path}: is of no format known here (ros, ulog, dataflash, tlog, alog, csv, json, nmea); "
+        "name one before it"
+    )
+    with pytest.raises(LogError) as refused:
+        listing(open_recording(path, "csv"))
+    assert str(refused.value) == f"{path}, line 1: has no header"
 
 
 @pytest.mark.parametrize(
@@ -642,6 +947,13 @@ def test_a_missing_package_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     result = call("import", "--list", path)
     assert result.exit_code == 2
     assert "pip install 'auvest[ros]'" in result.stderr
+
+
+def test_a_recording_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "none.csv"
+    with pytest.raises(LogError) as refused:
+        open_recording(path)
+    assert str(refused.value) == f"{path}: cannot be read: No such file or directory"
 
 
 def test_mapping_errors_are_no_log_errors() -> None:

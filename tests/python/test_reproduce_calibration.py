@@ -6,7 +6,10 @@ import json
 import os
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
+import numpy as np
 import pytest
 from conftest import ROOT
 
@@ -57,6 +60,24 @@ def test_what_holds() -> None:
     row = replace(row, set_name="ugps_pier59", right=Figures(0.6, None, None))
     bench = Bench({"ugps_pier59": Figures(0.6, None, None)}, [row])
     assert bench.held() == {"ugps_pier59": True}
+
+
+def test_figures_are_means_over_the_logs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of the errors where there is a truth, else of what was held out, which has no sigmas."""
+
+    def replayed(log: Any, *_: object, **__: object) -> SimpleNamespace:
+        numbers, sigmas = log
+        columns = {"sigma_x_m": np.array(sigmas[0]), "sigma_y_m": np.array(sigmas[1])}
+        return SimpleNamespace(numbers=numbers, errors=SimpleNamespace(columns=lambda: columns))
+
+    monkeypatch.setattr(measure, "replay", replayed)
+    first = {"truth": True, "rmse_m": 1.0, "inside_3_sigma": 0.75, "held_out_rmse_m": 50.0}
+    second = {"truth": True, "rmse_m": 3.0, "inside_3_sigma": 0.25, "held_out_rmse_m": 70.0}
+    logs: list[Any] = [(first, ([3.0, 6.0], [4.0, 8.0])), (second, ([5.0], [12.0]))]
+    settings = find_settings("goats14")
+    assert measure.figures(logs, settings) == Figures(2.0, 0.5, (7.5 + 13) / 2)
+    logs = [({**numbers, "truth": False}, sigmas) for numbers, sigmas in logs]
+    assert measure.figures(logs, settings) == Figures(60.0, None, None)
 
 
 @needs_data

@@ -25,6 +25,7 @@ from auvest.sweeps import dask, processes, read_plan
 from auvest.sweeps.figures import heat_map, profiles
 from auvest.sweeps.plan import Task, run_task
 from auvest.sweeps.processes import Processes
+from auvest.sweeps.result import SweepResult
 from auvest.sweeps.worker import Failure, attempt
 from tests import sweeps
 from tests.slow import SLOW
@@ -467,3 +468,51 @@ def test_a_part_that_there_is_not_is_refused(part: str, tmp_path: Path) -> None:
         app, ["sweep", str(config), "--part", part, "--output", str(tmp_path / "o")]
     )
     assert done.exit_code == 2
+
+
+def test_a_result_has_a_line_for_each_point_and_all_rows_in_one_table() -> None:
+    """Means are over the runs that did not fail and have a number; of one there is no error."""
+    rows = [
+        {
+            "run": np.arange(5),
+            "status": np.array([0, 0, 1, 0, 0]),
+            "finished": np.array([1, 1, 1, 0, 1]),
+            "x": np.array([1.0, 3.0, 100.0, 1000.0, np.nan]),
+            "y": np.array([5.0, 9.0, 100.0, 1000.0, 7.0]),
+        },
+        {},
+        {
+            "run": np.array([0]),
+            "status": np.array([0]),
+            "finished": np.array([1]),
+            "x": np.array([8.0]),
+            "y": np.array([-1.5]),
+        },
+        {},
+    ]
+    result = SweepResult(read_plan(SMALL), rows, missing=2, computed=1)
+    lines = [
+        {"noise.range_m": 0.05, "noise.dropout": 0.0, "runs": 5, "failed_runs": 2,
+         "x": 2.0, "x_se": 1.0, "y": 7.0, "y_se": 2 / 3**0.5},
+        {"noise.range_m": 0.05, "noise.dropout": 0.2, "runs": 0, "failed_runs": 0,
+         "x": np.nan, "x_se": np.nan, "y": np.nan, "y_se": np.nan},
+        {"noise.range_m": 0.2, "noise.dropout": 0.0, "runs": 1, "failed_runs": 0,
+         "x": 8.0, "x_se": np.nan, "y": -1.5, "y_se": np.nan},
+        {"noise.range_m": 0.2, "noise.dropout": 0.2, "runs": 0, "failed_runs": 0,
+         "x": np.nan, "x_se": np.nan, "y": np.nan, "y_se": np.nan},
+    ]  # fmt: skip
+    table = result.table()
+    assert [list(line) for line in table] == [list(line) for line in lines]
+    for found, line in zip(table, lines, strict=True):
+        np.testing.assert_allclose([*found.values()], [*line.values()], rtol=1e-15)
+    columns = result.columns()
+    assert columns["noise.range_m"].tolist() == [0.05] * 5 + [0.2]
+    assert columns["noise.dropout"].tolist() == [0.0] * 6
+    assert columns["run"].tolist() == [0, 1, 2, 3, 4, 0]
+    assert columns["y"].tolist() == [5.0, 9.0, 100.0, 1000.0, 7.0, -1.5]
+    assert not result.complete
+    assert result.measures == ["x", "y"]
+    assert (result.measure, result.showing("y").measure) == ("x", "y")
+    with pytest.raises(ValueError, match=r"^measure must be one of x, y, not 'z'$"):
+        result.showing("z")
+    assert replace(result, rows=[{}] * 4).columns() == {}
