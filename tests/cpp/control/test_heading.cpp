@@ -406,7 +406,10 @@ TEST_CASE_TEMPLATE("heading: what is refused changes nothing", Scalar, float, do
   CHECK(reference.value == Scalar(7));
   typename auvest::ReferenceModel<Scalar>::Params p;
   p.max_rate = 0;
-  CHECK(auvest::ReferenceModel<Scalar>(p).check() == Status::kBadParameter);
+  auvest::ReferenceModel<Scalar> wrong(p);
+  CHECK(wrong.check() == Status::kBadParameter);
+  CHECK(wrong.update(0, 1, reference) == Status::kBadParameter);
+  CHECK(reference.value == Scalar(7));
 }
 
 }  // namespace

@@ -439,6 +439,7 @@ TEST_CASE_TEMPLATE("spline: what is refused, warned of, and held at the end", Sc
   const Points<Scalar> good = {{0, 0}, {50, 0}, {100, 50}};
   REQUIRE(path.start(good.data(), 3) == Status::kOk);
   CHECK(path.report().problem == PlanProblem::kNone);
+  CHECK(path.report().leg == 0);
   const Points<Scalar> twice = {{0, 0}, {50, 0}, {50, 0}};
   CHECK(path.start(twice.data(), 3) == Status::kBadParameter);
   CHECK(path.report().problem == PlanProblem::kTooClose);

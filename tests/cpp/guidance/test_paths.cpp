@@ -202,6 +202,11 @@ TEST_CASE_TEMPLATE("waypoints: after the end the line goes on, or a circle begin
     CHECK(near(point.cosine, 0, 4));
     CHECK(near(point.sine, -1, 4));
     CHECK(circle.remaining_m() == Scalar(0));
+    // It is a whole one: seven eighths on, the way along it is that from its beginning.
+    const double a = 7 * kPi / 4;
+    REQUIRE(circle.locate(Scalar(-lam * 20 * (1 - std::cos(a))), Scalar(100 + 20 * std::sin(a)),
+                          point) == Status::kOk);
+    CHECK(near(point.along_m, 20 * a, 1000));
   }
 }
 
@@ -298,6 +303,8 @@ TEST_CASE_TEMPLATE("waypoints: what is refused, which leg and why; the old plan 
                    float, double) {
   const auvest::Waypoint<Scalar> good[] = {{0, 0}, {100, 0}, {100, 40}};
   auto path = plan_with<Scalar>(12, 0);
+  CHECK(path.report().problem == PlanProblem::kTooFew);  // no plan yet
+  CHECK(path.report().leg == 0);
   REQUIRE(path.start(good, 3) == Status::kOk);
   PathPoint<Scalar> point;
   REQUIRE(path.locate(95, 0, point) == Status::kOk);

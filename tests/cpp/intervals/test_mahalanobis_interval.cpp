@@ -204,6 +204,28 @@ TEST_CASE("bad parameters are reported") {
   CHECK(changed(&P::ratio_max, std::nan("")) == Status::kBadParameter);
   CHECK(changed(&P::tau_max, 1) == Status::kBadParameter);
   CHECK(changed(&P::tau_min, 0) == Status::kBadParameter);
+
+  // The same of a memory, which is put back from outside: tau lies between 0 and 1, M within them.
+  const auto remembering = [](double Law::Memory::*member, double value) {
+    Law law;
+    law.restart(Position(0, 0), Position(0, 0));
+    law.memory.*member = value;
+    return law.check();
+  };
+  using M = Law::Memory;
+  CHECK(remembering(&M::tau, 0.25) == Status::kOk);
+  for (const double tau : {0.0, 1.0, -0.5, std::nan("")}) {
+    CHECK(remembering(&M::tau, tau) == Status::kBadParameter);
+  }
+  for (const double interval : {0.0, -1.0}) {
+    CHECK(remembering(&M::interval, interval) == Status::kBadParameter);
+  }
+  for (const double ratio : {0.0, 1.0}) CHECK(remembering(&M::ratio, ratio) == Status::kOk);
+  for (const double ratio : {-0.1, 1.1}) {
+    CHECK(remembering(&M::ratio, ratio) == Status::kBadParameter);
+  }
+  CHECK(remembering(&M::mahalanobis_squared, 0) == Status::kOk);
+  CHECK(remembering(&M::mahalanobis_squared, -1) == Status::kBadParameter);
 }
 
 }  // namespace

@@ -222,6 +222,9 @@ TEST_CASE("allocation: bad parameters are reported") {
   CHECK(changed([](P& p) { p.lowest_n = 0; }) == Status::kBadParameter);
   CHECK(changed([](P& p) { p.highest_n = -1; }) == Status::kBadParameter);
   CHECK(changed([](P& p) { p.priority[3] = 6; }) == Status::kBadParameter);
+  auto inverse = good.inverse();
+  inverse(7, 5) = std::numeric_limits<double>::quiet_NaN();
+  CHECK(auvest::Allocation<double, 8>(inverse, good.params).check() == Status::kBadParameter);
 }
 
 }  // namespace

@@ -1,7 +1,9 @@
 // The forces and actuators one by one, against closed forms and independent integrals.
+#include <Eigen/Geometry>
 #include <limits>
 
 #include "auvest/vehicle/cross_flow.hpp"
+#include "auvest/vehicle/remus100_prestero.hpp"
 #include "auvest/vehicle/thrust_curve.hpp"
 #include "close.hpp"
 #include "peer_hull.hpp"
@@ -222,6 +224,60 @@ TEST_CASE(
 }
 
 // ---- Lags and thrust curves ---------------------------------------------------------------------
+
+TEST_CASE("restoring: weight and buoyancy pull at their own centres, in any attitude") {
+  // All arms differ, and so do W and B: r_g x W d - r_b x B d, d the down of the body's frame.
+  auto p = auvest::remus100<double>();
+  p.body.xg_m = 0.03, p.body.yg_m = -0.02, p.body.zg_m = 0.05;
+  p.restoring.xb_m = -0.07, p.restoring.yb_m = 0.04, p.restoring.zb_m = -0.01;
+  p.restoring.weight_n = 300, p.restoring.buoyancy_n = 310;
+  const Remus<double> hull(p);
+  const double still[6] = {0, 0, 0, 0, 0, 0};
+  const double angles[3] = {0.4, -0.7, 2};
+  const Eigen::Vector3d down(std::sin(0.7), std::cos(0.7) * std::sin(0.4),
+                             std::cos(0.7) * std::cos(0.4));
+  const Eigen::Vector3d weight = 300 * down, lift = -310 * down;
+  const Eigen::Vector3d moment = Eigen::Vector3d(0.03, -0.02, 0.05).cross(weight) +
+                                 Eigen::Vector3d(-0.07, 0.04, -0.01).cross(lift);
+  const auto tau = forces(hull, still, angles);
+  for (int i = 0; i < 3; ++i) {
+    CAPTURE(i);
+    CHECK(tau(i) == close_to(weight(i) + lift(i), 1e-13));
+    CHECK(tau(3 + i) == close_to(moment(i), 1e-13));
+  }
+}
+
+/// Actuators beyond limits of which no two are alike, and within them.
+template <class Hull>
+void check_limits(const typename Hull::Params& params) {
+  const Hull hull(params);
+  double beyond[3] = {9, 9, 9}, below[3] = {-9, -9, -9}, within[3] = {0.05, -0.1, 0.2};
+  hull.vehicle().limit_actuators(beyond);
+  hull.vehicle().limit_actuators(below);
+  hull.vehicle().limit_actuators(within);
+  for (int i = 0; i < 3; ++i) {
+    CAPTURE(i);
+    CHECK(beyond[i] == 0.1 * (i + 1));
+    CHECK(below[i] == -0.2 * (i + 1));
+    CHECK(within[i] == (i == 0 ? 0.05 : i == 1 ? -0.1 : 0.2));
+  }
+}
+
+template <class Params>
+void set_limits(Params& lag, int i) {
+  lag.high = 0.1 * (i + 1);
+  lag.low = -0.2 * (i + 1);
+}
+
+TEST_CASE("torpedoes: rudder, stern planes and shaft stay within their own limits") {
+  auto p = auvest::remus100<double>();
+  set_limits(p.rudder.servo, 0), set_limits(p.stern_planes.servo, 1);
+  set_limits(p.propeller.shaft, 2);
+  check_limits<Remus<double>>(p);
+  auto q = auvest::remus100_prestero<double>();
+  set_limits(q.rudder, 0), set_limits(q.stern_planes, 1), set_limits(q.shaft, 2);
+  check_limits<auvest::Hull<auvest::CoefficientTorpedo<double>>>(q);
+}
 
 TEST_CASE("lag: saturation, dead band, rate limit, and the exponential between them") {
   auto p = auvest::Lag<double>::Params::symmetric(0.25, 0.1);

@@ -1,6 +1,8 @@
 // Bad input, and steps that are too long: refused, with nothing lost.
 #include "auvest/vehicle/stable_step.hpp"
 
+#include <cmath>
+#include <complex>
 #include <cstring>
 #include <limits>
 
@@ -112,6 +114,34 @@ TEST_CASE("largest step: shorter where the ROV spins, and a Munk moment is no re
   y(6) = 1.5;
   CHECK(auvest::largest_stable_step<Rk4>(munk, y, command<Remus<double>>(0, 0, 900)) ==
         doctest::Approx(0.278529).epsilon(1e-3));
+}
+
+TEST_CASE(
+    "largest step: each of roll and pitch bounds it where its righting arm is the stiff one") {
+  // M a'' + D a' + B arm a = 0: RK4 is stable while |1 + z + z^2/2 + z^3/6 + z^4/24| <= 1, z = h l.
+  for (const bool roll : {true, false}) {
+    CAPTURE(roll);
+    auto p = auvest::bluerov2_heavy<double>();
+    p.restoring.zb_m = -2;
+    (roll ? p.body.iyy_kg_m2 : p.body.ixx_kg_m2) = 500;
+    const double inertia = roll ? p.body.ixx_kg_m2 + p.added_mass.roll_kg_m2
+                                : p.body.iyy_kg_m2 + p.added_mass.pitch_kg_m2;
+    const double decay =
+        0.5 * (roll ? p.linear_damping.roll_kg_m2_s : p.linear_damping.pitch_kg_m2_s) / inertia;
+    const double stiff = p.restoring.buoyancy_n * 2 / inertia;
+    const std::complex<double> root(-decay, std::sqrt(stiff - decay * decay));
+    double low = 0.01, high = 0.2;  // above it the mode grows
+    for (int k = 0; k < 40; ++k) {
+      const double h = 0.5 * (low + high);
+      const auto z = h * root;
+      (std::abs(1.0 + z * (1.0 + z / 2.0 * (1.0 + z / 3.0 * (1.0 + z / 4.0)))) <= 1 ? low : high) =
+          h;
+    }
+    const Rov<double> hull(p);
+    CHECK(auvest::largest_stable_step<Rk4>(hull, Rov<double>::State::Zero(),
+                                           Rov<double>::Command::Zero()) ==
+          doctest::Approx(low).epsilon(2e-3));
+  }
 }
 
 // ---- Bad parameters -----------------------------------------------------------------------------
