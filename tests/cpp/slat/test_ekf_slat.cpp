@@ -540,7 +540,7 @@ TEST_CASE("outage: a shared state that is refused leaves the one before") {
   for (int n = 0; n < 2; ++n) CHECK(outage.master(n).x == masters[n].x);
 }
 
-TEST_CASE("EKF-SLAT: a planned change of velocity is that of its own master") {
+TEST_CASE("EKF-SLAT: of two masters each has its own planned change and one echo in a ping") {
   using Filter = OpenEkf<Compass<double>, Master<double>, 2>;
   Random random(7);
   Belief<double, 2> slave;
@@ -567,6 +567,16 @@ TEST_CASE("EKF-SLAT: a planned change of velocity is that of its own master") {
     CHECK(with.master(n).P == without.master(n).P);
   }
   CHECK(with.slave().x == without.slave().x);
+
+  // Two echoes of one master in a ping are refused, next to each other or not.
+  Echo<double> ping[3];
+  for (int s = 0; s < 3; ++s) {
+    ping[s].master = s % 2;
+    ping[s].z << 220, -2;
+  }
+  const auvest::Sonar<double> sonar;
+  CHECK(with.update(ping, 3, sonar, random) == Status::kBadParameter);
+  CHECK(with.update(ping + 1, 2, sonar, random) == Status::kOk);
 }
 
 }  // namespace
