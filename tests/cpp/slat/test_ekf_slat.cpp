@@ -540,20 +540,22 @@ TEST_CASE("outage: a shared state that is refused leaves the one before") {
   for (int n = 0; n < 2; ++n) CHECK(outage.master(n).x == masters[n].x);
 }
 
-TEST_CASE("EKF-SLAT: of two masters each has its own planned change and one echo in a ping") {
-  using Filter = OpenEkf<Compass<double>, Master<double>, 2>;
+TEST_CASE("EKF-SLAT: of several masters each has its own planned change and one echo in a ping") {
+  using Filter = OpenEkf<Compass<double>, Master<double>, 3>;
   Random random(7);
   Belief<double, 2> slave;
   slave.x << 7, 8;
   slave.P.setIdentity();
   const Vector<double, 2> u(5, 0.2);
-  const Vector<double, 2> changes[2] = {Vector<double, 2>(0.5, -1), Vector<double, 2>(3, -4)};
+  const Vector<double, 2> changes[3] = {Vector<double, 2>(0.5, -1), Vector<double, 2>(3, -4),
+                                        Vector<double, 2>(0, 0)};
   const double dt = 2;
   Filter with((Compass<double>()), Master<double>()), without = with;
   for (Filter* filter : {&with, &without}) {
     REQUIRE(filter->reset(slave, random) == Status::kOk);
     REQUIRE(filter->add_master(master_belief<double>(100, 200)) == Status::kOk);
     REQUIRE(filter->add_master(master_belief<double>(-100, 50)) == Status::kOk);
+    REQUIRE(filter->add_master(master_belief<double>(0, -90)) == Status::kOk);
     REQUIRE(filter->predict(dt, u, random, filter == &with ? changes : nullptr) == Status::kOk);
   }
   for (int n = 0; n < 2; ++n) {
