@@ -4,6 +4,7 @@
 
 #include "close.hpp"
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -16,6 +17,7 @@
 
 #include "auvest/auvest.hpp"
 #include "auvest/registry.hpp"
+#include "auvest/vehicle/remus100_prestero.hpp"
 
 namespace {
 
@@ -33,6 +35,7 @@ struct Member {
 struct Seen {
   const char* begin;
   std::vector<Member> members;
+  std::set<std::size_t> places;
   std::size_t bytes = 0;  ///< in all members
   std::size_t end = 0;    ///< of the last one
   int steps_back = 0;     ///< members that stand before their predecessor
@@ -52,6 +55,7 @@ struct Seen {
   void add(const char* name, const Kind& member, double value) {
     const std::size_t at = std::size_t(reinterpret_cast<const char*>(&member) - begin);
     if (at < end) ++steps_back;
+    places.insert(at);
     end = at + sizeof member;
     bytes += sizeof member;
     members.push_back(Member(name, value));
@@ -245,6 +249,17 @@ TEST_CASE("parameters of models: documented defaults, each by its name") {
   check_visit<Odometry<double>::Params>(
       "Odometry",
       {{"sigma_distance", 0.05}, {"sigma_drift", 0.1}, {"sigma_turn", 0.001}, "sigma_turned"});
+  check_visit<OdometryConstants<double>::Params>("OdometryConstants", {{"sigma_distance", 0.05},
+                                                                       {"sigma_drift", 0.1},
+                                                                       {"sigma_turn", 0.001},
+                                                                       "sigma_turned",
+                                                                       "speed_state",
+                                                                       "turn_state",
+                                                                       "walk_0",
+                                                                       "walk_1",
+                                                                       "walk_2",
+                                                                       "walk_3",
+                                                                       "walk_4"});
   check_visit<WhiteAcceleration<double, 3>::Params>(
       "WhiteAcceleration", {{"velocity_psd", 1e-4}, {"vertical_velocity_psd", 1e-4}});
   check_visit<PlanarHull<double>::Params>("PlanarHull", {{"surge_psd", 1},
@@ -399,6 +414,7 @@ struct Check {
     std::set<std::string> names;
     for (const Member& member : seen.members) names.insert(member.name);
     CHECK(names.size() == seen.members.size());
+    CHECK(seen.places.size() == seen.members.size());
     if (name.substr(0, 8) != "Position") CHECK(seen.bytes == sizeof(typename Model::Params));
     return 1;
   }
@@ -428,6 +444,162 @@ TEST_CASE("parameters of registered models: every name is that of another number
   CHECK(models == 12);
   CHECK(check_sensors<6>() == 8);
   CHECK(check_sensors<8>() == 5);
+}
+
+// ---- What check() takes
+// ---------------------------------------------------------------------------
+
+/// Puts a value in the place of one of the numbers, those of groups among them.
+struct Put {
+  int which;
+  double value;
+  int& count;
+  std::string& name;
+  std::string before;
+
+  void operator()(const std::string& of, double& number) {
+    if (count++ != which) return;
+    number = value;
+    name = before + of;
+  }
+  void operator()(const std::string&, bool&) {}
+  void operator()(const std::string&, std::uint8_t&) {}
+  template <int Rows>
+  void operator()(const std::string& of, Vector<double, Rows>& numbers) {
+    for (int i = 0; i < Rows; ++i) (*this)(of, numbers(i));
+  }
+  template <class Group>
+  void operator()(const std::string& of, Group& group) {
+    group.visit(Put{which, value, count, name, before + of + "."});
+  }
+};
+
+/// The members, by name and in order, that may have this value (or may not) where all others are
+/// those of `params`; without the mounts of thrusters, of which three numbers make one length.
+template <class Thing>
+std::string members_where(bool taken, double value, const typename Thing::Params& params) {
+  REQUIRE(Thing(params).check() == Status::kOk);
+  std::string names;
+  for (int which = 0;; ++which) {
+    typename Thing::Params changed = params;
+    std::string name;
+    int count = 0;
+    changed.visit(Put{which, value, count, name, ""});
+    if (which >= count) return names;
+    if (!std::isnan(value) && name.find(".thruster_") != std::string::npos) continue;
+    if ((Thing(changed).check() == Status::kOk) == taken)
+      names += (names.empty() ? "" : " ") + name;
+  }
+}
+
+struct Range {
+  std::string of, may_be_negative, may_not_be_zero;
+};
+
+template <class Thing>
+void check_range(const Range& range,
+                 const typename Thing::Params& params = typename Thing::Params()) {
+  CAPTURE(range.of);
+  CHECK(members_where<Thing>(true, std::numeric_limits<double>::quiet_NaN(), params) == "");
+  CHECK(members_where<Thing>(true, -1, params) == range.may_be_negative);
+  CHECK(members_where<Thing>(false, 0, params) == range.may_not_be_zero);
+}
+
+TEST_CASE("parameters out of range: which may be negative, which 0, and none NaN") {
+  check_range<LineOfSight<double>>({"LineOfSight", "", "lookahead_m"});
+  check_range<IntegralLineOfSight<double>>({"IntegralLineOfSight", "", "lookahead_m gain_m_s"});
+  check_range<AdaptiveLineOfSight<double>>({"AdaptiveLineOfSight", "", "lookahead_m"});
+  check_range<VerticalLineOfSight<double>>({"VerticalLineOfSight", "", "lookahead_m"});
+  check_range<CrabFeedForward<double>>({"CrabFeedForward", "", "lookahead_m"});
+  check_range<VectorField<double>>({"VectorField", "", "approach_rad gain"});
+  check_range<Waypoints<double>>({"Waypoints", "end_radius_m", ""});
+  check_range<DubinsPath<double>>({"DubinsPath", "", "radius_m"});
+  check_range<SplinePath<double>>({"SplinePath", "", ""});
+  check_range<HeadingControl<double>>(
+      {"HeadingControl", "",
+       "time_constant_s gain speed_m_s max_rudder_rad frequency_rad_s damping"});
+  check_range<HeadingSlidingMode<double>>(
+      {"HeadingSlidingMode", "",
+       "time_constant_s gain speed_m_s max_rudder_rad bandwidth_rad_s boundary_rad_s"});
+  check_range<HeadingReference<double>>({"HeadingReference", "", "gain max_rate_rad_s"});
+  check_range<ReferenceModel<double>>({"ReferenceModel", "", "frequency_rad_s damping max_rate"});
+  check_range<HeadingFilter<double>>({"HeadingFilter", "", ""});
+  check_range<SpeedControl<double>>({"SpeedControl", "", "advance_m max_rev_s"});
+  check_range<DepthControl<double>>({"DepthControl", "", "max_pitch_rad"});
+  check_range<PitchControl<double>>({"PitchControl", "", "max_plane_rad"});
+  check_range<Autopilot<double>>(
+      {"Autopilot", "",
+       "reference.gain reference.max_rate_rad_s heading.time_constant_s heading.gain "
+       "heading.speed_m_s heading.max_rudder_rad heading.frequency_rad_s heading.damping "
+       "speed.advance_m speed.max_rev_s depth.max_pitch_rad pitch.max_plane_rad"});
+  check_range<PoseControl<double>>({"PoseControl", "",
+                                    "inertia inertia inertia inertia inertia inertia frequency "
+                                    "frequency frequency frequency frequency frequency"});
+  check_range<Hull<Torpedo<double, Keel<double>>>>(
+      {"Torpedo",
+       "body.xg_m body.yg_m body.zg_m added_mass.surge_kg added_mass.sway_kg added_mass.heave_kg "
+       "added_mass.pitch_kg_m2 added_mass.yaw_kg_m2 added_mass.sway_yaw_kg_m "
+       "added_mass.heave_pitch_kg_m restoring.xb_m restoring.yb_m restoring.zb_m keel.x_m keel.z_m "
+       "propeller.thrust_1 propeller.torque_0 propeller.torque_1 propeller.roll_torque "
+       "propeller.shaft.low rudder.x_m rudder.servo.low stern_planes.x_m stern_planes.servo.low",
+       "body.mass_kg body.ixx_kg_m2 body.iyy_kg_m2 body.izz_kg_m2 density_kg_m3 "
+       "lift_drag.aspect_ratio lift_drag.oswald cross_flow.length_m keel.foil.aspect_ratio "
+       "keel.foil.oswald propeller.diameter_m propeller.thrust_0 propeller.advance_1 "
+       "propeller.thrust_deduction propeller.shaft.time_constant_s rudder.servo.time_constant_s "
+       "stern_planes.servo.time_constant_s"},
+      remus100<double, Keel<double>>());
+  check_range<Hull<Rov<double, 8>>>(
+      {"Rov",
+       "body.xg_m body.yg_m body.zg_m added_mass.surge_kg added_mass.sway_kg added_mass.heave_kg "
+       "added_mass.sway_yaw_kg_m added_mass.heave_pitch_kg_m restoring.xb_m restoring.yb_m "
+       "restoring.zb_m thrusters.curve.c5_n thrusters.curve.c9_n",
+       "body.mass_kg body.ixx_kg_m2 body.iyy_kg_m2 body.izz_kg_m2 thrusters.curve.c1_n "
+       "thrusters.curve.c3_n thrusters.curve.c7_n thrusters.curve.limit thrusters.time_constant_s"},
+      bluerov2_heavy<double>());
+  check_range<Hull<CoefficientTorpedo<double>>>(
+      {"CoefficientTorpedo",
+       "body.xg_m body.yg_m body.zg_m added_mass.surge_kg added_mass.sway_kg added_mass.heave_kg "
+       "added_mass.pitch_kg_m2 added_mass.yaw_kg_m2 added_mass.sway_yaw_kg_m "
+       "added_mass.heave_pitch_kg_m restoring.xb_m restoring.yb_m restoring.zb_m x_uu x_wq x_qq "
+       "x_vr x_rr y_vv y_rr y_uv y_ur y_wp y_pq y_uu_rudder z_ww z_qq z_uw z_uq z_vp z_rp "
+       "z_uu_stern k_pp m_ww m_qq m_uw m_uq m_vp m_rp m_uu_stern n_vv n_rr n_uv n_ur n_wp n_pq "
+       "n_uu_rudder thrust_n_s2 torque_n_m_s2 rudder.low stern_planes.low shaft.low",
+       "body.mass_kg body.ixx_kg_m2 body.iyy_kg_m2 body.izz_kg_m2 rudder.time_constant_s "
+       "stern_planes.time_constant_s shaft.time_constant_s"},
+      remus100_prestero<double>());
+  QuadraticThrust<double>::Params thrust;
+  thrust.ahead_n = 51, thrust.astern_n = 40, thrust.dead_band = 0.08;
+  check_range<QuadraticThrust<double>>({"QuadraticThrust", "", "ahead_n astern_n"}, thrust);
+  check_range<EulerAcceleration<double>>({"EulerAcceleration", "", ""});
+  check_range<SpeedHeading<double, true, true>>({"SpeedHeading", "", ""});
+  check_range<SpeedHeadingCurrent<double>>({"SpeedHeadingCurrent", "", ""});
+  check_range<Odometry<double>>({"Odometry", "", ""});
+  check_range<OdometryConstants<double>>({"OdometryConstants", "", ""});
+  check_range<WhiteAcceleration<double, 3>>({"WhiteAcceleration", "", ""});
+  check_range<PlanarHull<double>>({"PlanarHull", "", "step_s"});
+  check_range<RangeBearing<double, 6>>({"RangeBearing", "station_x_m station_y_m smallest_range_m",
+                                        "sigma_range_m sigma_bearing_rad largest_range_m"});
+  check_range<RangeBearingElevation<double, 6>>(
+      {"RangeBearingElevation", "station_x_m station_y_m station_z_m smallest_range_m",
+       "sigma_range_m sigma_bearing_rad sigma_elevation_rad largest_range_m"});
+  check_range<LeaderRange<double, 6>>(
+      {"LeaderRange", "leader_x_m leader_y_m smallest_range_m", "sigma_range_m largest_range_m"});
+  check_range<ScaledRange<double, 8>>(
+      {"ScaledRange", "leader_x_m leader_y_m smallest_range_m", "sigma_range_m largest_range_m"});
+  check_range<Depth<double, 6>>({"Depth", "", "sigma_m"});
+  check_range<BodyVelocity<double, 6, 3>>(
+      {"BodyVelocity", "heading_rad", "sigma_forward_m_s sigma_sideways_m_s sigma_vertical_m_s"});
+  check_range<HeadingSpeed<double, 8>>(
+      {"HeadingSpeed", "", "sigma_heading_rad sigma_forward_m_s sigma_starboard_m_s"});
+  check_range<Huber<double>>({"Huber", "", "k"});
+  check_range<Hampel<double>>({"Hampel", "", "a b c"});
+  check_range<Igg<double>>({"Igg", "", "k0 k1"});
+  check_range<FixedInterval<double>>({"FixedInterval", "", "interval_s"});
+  check_range<CovarianceBudget<double>>(
+      {"CovarianceBudget", "", "initial_s min_s max_s position_sigma_m"});
+  check_range<MahalanobisInterval<double>>(
+      {"MahalanobisInterval", "",
+       "initial_s min_s max_s tau0 epsilon gamma1_m2 gamma2 ratio_max tau_min tau_max"});
 }
 
 }  // namespace

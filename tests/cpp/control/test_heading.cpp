@@ -221,6 +221,7 @@ TEST_CASE_TEMPLATE("reference model: its step response, the short way round", Sc
       const double wt = 0.5 * t;
       const double x = 20 * kDegree * (1 - (1 + wt + wt * wt / 2) * std::exp(-wt));
       CHECK(apart(double(reference.value), start + x) < 4e-4);  // Euler of 1 ms, 0.35 rad
+      CHECK(std::fabs(double(reference.value)) <= kPi + 1e-6);
     }
   }
   // A length is not wrapped.

@@ -291,6 +291,17 @@ TEST_CASE_TEMPLATE("dubins path: what is refused, and what is warned of", Scalar
   CHECK(path.start(nowhere, 2) == Status::kNotFinite);
   REQUIRE(path.locate(1, 0, point) == Status::kOk);  // the old plan goes on
   CHECK(path.locate(Scalar(kNan), 0, point) == Status::kNotFinite);
+  // After the end of one plan another begins at its own beginning.
+  const PathPose<Scalar> short_ones[] = {{0, 0, 0}, {30, 0, 0}, {60, 0, 0}};
+  for (int again = 0; again < 2; ++again) {
+    REQUIRE(path.start(short_ones, 3) == Status::kOk);
+    CHECK(!path.finished());
+    CHECK(path.leg() == 0);
+    REQUIRE(path.locate(10, 1, point) == Status::kOk);
+    CHECK(std::fabs(double(path.remaining_m()) - 20) < 1e-4);
+    for (int x = 20; x <= 70; x += 5) REQUIRE(path.locate(Scalar(x), 1, point) == Status::kOk);
+    CHECK(path.finished());
+  }
   params.radius_m = 0;
   CHECK(DubinsPath<Scalar>(params).start(good, 2) == Status::kBadParameter);
 }

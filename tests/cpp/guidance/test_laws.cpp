@@ -233,6 +233,11 @@ TEST_CASE_TEMPLATE("laws: what is refused changes nothing", Scalar, float, doubl
   CHECK(command.heading_rad == Scalar(7));
   CHECK(command.rate_rad_s == Scalar(8));
 
+  auvest::IntegralLineOfSight<Scalar> integral;
+  REQUIRE(integral.restart(Scalar(0.25)) == Status::kOk);
+  CHECK(integral.restart(nan) == Status::kNotFinite);
+  CHECK(integral.integral() == Scalar(0.25));
+
   auvest::CrabFeedForward<Scalar> crab;
   REQUIRE(crab.set_current(0, Scalar(0.3)) == Status::kOk);
   const double before = heading_of(crab, good);

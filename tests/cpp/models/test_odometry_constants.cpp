@@ -75,6 +75,13 @@ TEST_CASE("odometry with constants: distances grow by the speed's error, turns b
   q.topLeftCorner<3, 3>() = odometry.Q(0.5);
   q(4, 4) = 0.5 * 0.02 * 0.02;
   CHECK(process.Q(0.5) == q);
+  // Each constant walks by itself.
+  Process walking = process;
+  walking.params.walk_0 = 0.01, walking.params.walk_2 = 0.03;
+  walking.params.walk_3 = 0.04, walking.params.walk_4 = 0.05;
+  for (int i = 0; i < 5; ++i) {
+    CHECK(walking.Q(0.5)(3 + i, 3 + i) == doctest::Approx(0.5 * 1e-4 * (i + 1) * (i + 1)));
+  }
 }
 
 TEST_CASE("scaled range: its numbers, and what they hang on") {

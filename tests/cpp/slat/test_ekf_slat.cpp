@@ -7,6 +7,9 @@
 
 #include <Eigen/LU>
 #include <cmath>
+#include <cstring>
+#include <new>
+#include <type_traits>
 
 #include "auvest/filters/ekf.hpp"
 #include "auvest/models/piecewise_acceleration.hpp"
@@ -479,8 +482,17 @@ TEST_CASE("SLAT filters: what is refused changes nothing; a reset begins anew") 
   CHECK(filter.log_likelihood() == log_likelihood);
 }
 
-TEST_CASE("dead reckoning: reads the lower triangle of P and gives both") {
-  auvest::DeadReckoning<Compass<double>> filter((Compass<double>()));
+TEST_CASE("dead reckoning: before a start nothing is known; reads the lower triangle of P") {
+  using Filter = auvest::DeadReckoning<Compass<double>>;
+  // In memory that holds something else.
+  std::aligned_storage<sizeof(Filter), alignof(Filter)>::type memory;
+  std::memset(&memory, 0xA5, sizeof memory);
+  Filter& filter = *new (&memory) Filter((Compass<double>()));
+  CHECK(filter.slave().x == Vector<double, 2>::Zero());
+  CHECK(filter.slave().P == auvest::Matrix<double, 2, 2>::Zero());
+  Random none(5);
+  CHECK(filter.predict(1, Vector<double, 2>(5, 0.2), none) == Status::kNotInitialised);
+  CHECK(filter.update(nullptr, 0, auvest::Sonar<double>(), none) == Status::kNotInitialised);
   Random random(5);
   Belief<double, 2> pose;
   pose.x << 7, 8;
@@ -511,10 +523,62 @@ TEST_CASE("outage: a shared state that is refused leaves the one before") {
   CHECK(outage.slave().x == Vector<double, 2>(7, 8));
   REQUIRE(outage.predict(1, u, random) == Status::kOk);
   CHECK(outage.filter().masters() == 1);
+  CHECK(outage.shared_masters() == 1);
   // It goes on from there, and is not started again.
   const auto position = outage.slave().x;
   REQUIRE(outage.predict(1, u, random) == Status::kOk);
   CHECK((outage.slave().x - position).norm() > 1);
+
+  // All that was shared is there at once, each master as itself, and starts the next outage.
+  masters[1] = master_belief<double>(-100, 50);
+  REQUIRE(outage.share(slave, masters, 2) == Status::kOk);
+  CHECK(outage.shared_masters() == 2);
+  CHECK(outage.slave().x == Vector<double, 2>(70, 80));
+  for (int n = 0; n < 2; ++n) CHECK(outage.master(n).x == masters[n].x);
+  REQUIRE(outage.predict(0, u, random) == Status::kOk);
+  CHECK(outage.filter().masters() == 2);
+  for (int n = 0; n < 2; ++n) CHECK(outage.master(n).x == masters[n].x);
+}
+
+TEST_CASE("EKF-SLAT: of several masters each has its own planned change and one echo in a ping") {
+  using Filter = OpenEkf<Compass<double>, Master<double>, 3>;
+  Random random(7);
+  Belief<double, 2> slave;
+  slave.x << 7, 8;
+  slave.P.setIdentity();
+  const Vector<double, 2> u(5, 0.2);
+  const Vector<double, 2> changes[3] = {Vector<double, 2>(0.5, -1), Vector<double, 2>(3, -4),
+                                        Vector<double, 2>(0, 0)};
+  const double dt = 2;
+  Filter with((Compass<double>()), Master<double>()), without = with;
+  for (Filter* filter : {&with, &without}) {
+    REQUIRE(filter->reset(slave, random) == Status::kOk);
+    REQUIRE(filter->add_master(master_belief<double>(100, 200)) == Status::kOk);
+    REQUIRE(filter->add_master(master_belief<double>(-100, 50)) == Status::kOk);
+    REQUIRE(filter->add_master(master_belief<double>(0, -90)) == Status::kOk);
+    REQUIRE(filter->predict(dt, u, random, filter == &with ? changes : nullptr) == Status::kOk);
+  }
+  for (int n = 0; n < 2; ++n) {
+    CAPTURE(n);
+    const Vector<double, 6> moved = with.master(n).x - without.master(n).x;
+    for (int axis = 0; axis < 2; ++axis) {
+      CHECK(moved(axis) == close_to(0.5 * dt * changes[n](axis), 1e-12));
+      CHECK(moved(2 + axis) == close_to(changes[n](axis), 1e-12));
+      CHECK(moved(4 + axis) == 0);
+    }
+    CHECK(with.master(n).P == without.master(n).P);
+  }
+  CHECK(with.slave().x == without.slave().x);
+
+  // Two echoes of one master in a ping are refused, next to each other or not.
+  Echo<double> ping[3];
+  for (int s = 0; s < 3; ++s) {
+    ping[s].master = s % 2;
+    ping[s].z << 220, -2;
+  }
+  const auvest::Sonar<double> sonar;
+  CHECK(with.update(ping, 3, sonar, random) == Status::kBadParameter);
+  CHECK(with.update(ping + 1, 2, sonar, random) == Status::kOk);
 }
 
 }  // namespace

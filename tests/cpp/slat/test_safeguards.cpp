@@ -7,8 +7,11 @@
 
 #include <Eigen/Eigenvalues>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <memory>
+#include <new>
+#include <type_traits>
 #include <vector>
 
 #include "auvest/models/constant_acceleration.hpp"
@@ -22,6 +25,60 @@
 #include "auvest/slat/slatf_shared.hpp"
 
 namespace {
+
+TEST_CASE("safeguards: silence is counted from a master's last echo, or from when it was known") {
+  // Another master's time goes on; what lay in memory before does not count.
+  using Guards = auvest::Safeguards<double, 2>;
+  std::aligned_storage<sizeof(Guards), alignof(Guards)>::type memory;
+  std::memset(&memory, 0x45, sizeof memory);  // numbers of 1e25
+  Guards& guards = *new (&memory) Guards;
+  auvest::EchoParams<double> p;
+  p.forget_after_s = 10;
+  guards.begin(0);
+  CHECK(!guards.forgotten(0, p));
+  guards.wait(10, 1);
+  CHECK(!guards.forgotten(0, p));  // at the bound, not beyond it
+  guards.begin(1);
+  guards.wait(0.5, 2);
+  CHECK(guards.forgotten(0, p));
+  CHECK(!guards.forgotten(1, p));
+  guards.accepted(0);
+  CHECK(!guards.forgotten(0, p));
+  guards.wait(9.75, 2);
+  CHECK(!guards.forgotten(0, p));
+  CHECK(guards.forgotten(1, p));
+  guards.reborn(1);
+  CHECK(!guards.forgotten(1, p));
+  p.forget_after_s = 0;  // never
+  guards.wait(1e6, 2);
+  CHECK(!guards.forgotten(0, p));
+}
+
+TEST_CASE("safeguards: the bounds of their parameters, on both sides") {
+  using P = auvest::EchoParams<double>;
+  const auto valid = [](void (*change)(P&)) {
+    P p;
+    change(p);
+    return p.valid();
+  };
+  CHECK(P().valid());
+  CHECK(valid([](P& p) { p.gate = 0; }));
+  CHECK(!valid([](P& p) { p.gate = -1; }));
+  CHECK(valid([](P& p) { p.recover_after = p.recover_of = 16; }));
+  CHECK(!valid([](P& p) { p.recover_of = 17; }));
+  CHECK(!valid([](P& p) { p.recover_after = 9; }));  // of 8
+  CHECK(valid([](P& p) { p.recover_after = 0; }));
+  CHECK(!valid([](P& p) { p.recover_after = -1; }));
+  CHECK(!valid([](P& p) { p.fastest_m_s = 0; }));
+  CHECK(!valid([](P& p) { p.forget_after_s = -1; }));
+  CHECK(valid([](P& p) { p.rebirth_velocity_m_s = p.rebirth_acceleration_m_s2 = 1e9; }));
+  CHECK(!valid([](P& p) { p.rebirth_velocity_m_s = 1.001e9; }));
+  CHECK(!valid([](P& p) { p.rebirth_acceleration_m_s2 = 1.001e9; }));
+  CHECK(!valid([](P& p) { p.rebirth_velocity_m_s = 0; }));
+  CHECK(!valid([](P& p) { p.rebirth_acceleration_m_s2 = 0; }));
+  CHECK(valid([](P& p) { p.longest_step_s = HUGE_VAL; }));
+  CHECK(!valid([](P& p) { p.longest_step_s = 0; }));
+}
 
 using namespace slat_test;
 
