@@ -32,6 +32,7 @@ namespace detail {
 template <int O, class Value, int N, int U>
 AUVEST_COLD void raise_lost_pivots(const Vector<Value, U>& before, const Matrix<Value, U, O>& slope,
                                    Matrix<Value, N, N>& P) {
+  using math::any;
   using math::larger;
   using math::select;
   // The noise of the dozen roundings behind an element.
@@ -39,9 +40,12 @@ AUVEST_COLD void raise_lost_pivots(const Vector<Value, U>& before, const Matrix<
   Matrix<Value, U, U> l;  // of C = L D L', D on the diagonal
   Vector<Value, U> inverse;
   math::Mask<Value> lost = Value(1) < Value(0);
+  AUVEST_UNROLL
   for (int i = 0; i < U; ++i) {
+    AUVEST_UNROLL
     for (int j = 0; j <= i; ++j) {
       Value c = math::minus_dot(P(O + i, O + j), &P(O + i, 0), &slope(j, 0), O);
+      AUVEST_UNROLL
       for (int k = 0; k < j; ++k) c = c - l(i, k) * l(k, k) * l(j, k);
       l(i, j) = i == j ? c : Value(c * inverse(j));
     }
@@ -54,6 +58,7 @@ AUVEST_COLD void raise_lost_pivots(const Vector<Value, U>& before, const Matrix<
     inverse(i) = select(there, Value(1) / select(there, l(i, i), Value(1)), Value(0));
     l(i, i) = larger(least, l(i, i));
   }
+  if (!any(lost)) return;
   for (int i = 0; i < U; ++i) {
     for (int j = 0; j <= i; ++j) {
       Value p = math::dot(&P(O + i, 0), &slope(j, 0), O);
@@ -75,9 +80,9 @@ AUVEST_INLINE void keep_definite(const Vector<Value, U>& before, const Matrix<Va
                                  Matrix<Value, N, N>& P) {
   static_assert(U == N - O, "the states that are not seen");
   using math::any;
-  math::Mask<Value> shrunk = Value(4) * before(0) > Value(5) * P(O, O);
+  math::Mask<Value> shrunk = before(0) > Value(1.25) * P(O, O);
   AUVEST_UNROLL
-  for (int i = 1; i < U; ++i) shrunk = shrunk || Value(4) * before(i) > Value(5) * P(O + i, O + i);
+  for (int i = 1; i < U; ++i) shrunk = shrunk || before(i) > Value(1.25) * P(O + i, O + i);
   if (any(shrunk)) detail::raise_lost_pivots<O>(before, slope, P);
 }
 
