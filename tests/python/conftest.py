@@ -7,9 +7,8 @@ import sys
 from pathlib import Path
 
 import pytest
-
-from tests.python.kept import FOLDER, difference, same, short
-from tests.python.messages import Messages, neutral, read, watch, write
+from kept import FOLDER, difference, same, short
+from messages import Messages, neutral, read, watch, write
 
 ROOT = Path(__file__).resolve().parents[2]
 

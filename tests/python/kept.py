@@ -19,6 +19,9 @@ _NUMBER = re.compile(r"(?<![\w.])[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?!\.?\w)")
 #: Digits that are kept of a number: single precision holds hardly more.
 _DIGITS = 6
 
+#: Lines of a table: its head and its end tell a column that is another.
+_HEAD, _END = 3, 2
+
 #: What is only rounding is 0.
 _NOTHING = 1e-12
 
@@ -32,6 +35,18 @@ def short(text: str) -> str:
         return told if len(digits) <= _DIGITS or "." not in told else f"{float(told):.{_DIGITS}g}"
 
     return _NUMBER.sub(rounded, text)
+
+
+def written(folder: Path) -> str:
+    """Return the texts in a folder, of each table its head and its end."""
+    parts = []
+    for path in sorted(folder.rglob("*")):
+        if path.suffix in (".json", ".md", ".csv", ".toml") and path.is_file():
+            lines = path.read_text(encoding="utf-8").splitlines()
+            if path.suffix == ".csv" and len(lines) > _HEAD + _END:
+                lines[_HEAD:-_END] = [f"... {len(lines)} lines"]
+            parts += [f"\n--- {path.relative_to(folder)}", *lines]
+    return re.sub(r'"version": "[^"]*"', '"version": "VERSION"', "\n".join(parts)) + "\n"
 
 
 def _last_digit(number: str) -> float:

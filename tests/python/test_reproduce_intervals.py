@@ -7,6 +7,7 @@ import re
 import numpy as np
 import pytest
 from conftest import ROOT
+from kept import written
 from result_support import tracking_result
 from typer.testing import CliRunner
 
@@ -163,7 +164,7 @@ def test_covariance_budget_dominates_without_heavy_tails(committed):
     assert all(c["dominates"] for c in calm)
 
 
-def test_command(tmp_path, monkeypatch):
+def test_command(tmp_path, monkeypatch, kept):
     turning = {name: track for name, track in intervals.TRACKS.items() if "turning" in name}
     monkeypatch.setattr(intervals, "TRACKS", turning)
     monkeypatch.setattr(intervals, "NOISES", ("normal",))
@@ -171,6 +172,7 @@ def test_command(tmp_path, monkeypatch):
     command = ["reproduce", "intervals", "--runs", "3", "--output", str(tmp_path), "--json"]
     result = CliRunner().invoke(app, command)
     assert result.exit_code == 0, result.output
+    kept("reproduce_intervals.txt", written(tmp_path))
     document = json.loads(result.stdout)
     assert [c["track"] for c in document["cases"]] == ["near, turning", "far, turning"]
     assert sorted(p.name for p in tmp_path.iterdir()) == [

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import functools
+import io
 import json
 import os
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from rich.console import Console
 from typer.testing import CliRunner
 
 from auvest.cli import app
 from auvest.importers.sets import IMPORTERS
 from auvest.logs import LogFolder
 from auvest.replay import find_settings, replay, settings_from
+from auvest.reproduce.logs import command, page
 from auvest.reproduce.logs import measure as logs
 
 DATA = os.environ.get("AUVEST_DATA")
@@ -203,7 +207,9 @@ def perfect(tmp_path_factory: pytest.TempPathFactory) -> logs.Reproduction:
     return logs.measure(data=made_up_recordings(tmp_path_factory.mktemp("recordings")))
 
 
-def test_recordings_without_noise_are_followed(perfect: logs.Reproduction) -> None:
+def test_recordings_without_noise_are_followed(
+    perfect: logs.Reproduction, kept: Callable[[str, str], None]
+) -> None:
     """Odometry and ranges agree with the truth, whatever the filter, its kernel and its noise."""
     filters = [("ekf", ""), *(("robust-ekf", k) for k in logs.KERNELS), ("robust-ukf", "hampel")]
     expected = [(name, *one) for name in logs.TARGETS for one in filters]
@@ -221,6 +227,10 @@ def test_recordings_without_noise_are_followed(perfect: logs.Reproduction) -> No
     settings = [(row.sigma_heading_rad, row.sigma_turn) for row in perfect.compass]
     assert settings == [(h, w) for h in logs.COMPASS_RAD for w in logs.COMPASS_WALK]
     assert len(perfect.held()) == 10
+    console = Console(width=80, record=True, file=io.StringIO())
+    for one in command._shown(perfect):
+        console.print(one)
+    kept("reproduce_logs.txt", console.export_text() + page.page(perfect))
 
 
 def test_the_tracker_gets_a_fix_every_so_often_by_either_way(perfect: logs.Reproduction) -> None:

@@ -9,6 +9,7 @@ import re
 import numpy as np
 import pytest
 from conftest import ROOT
+from kept import written
 from result_support import cooperative_result
 from typer.testing import CliRunner
 
@@ -73,7 +74,7 @@ def test_the_committed_page_shows_the_committed_numbers(committed):
         assert (PAGE / picture).is_file()
 
 
-def test_reproduce_writes_its_files_and_one_json_object(tmp_path, monkeypatch):
+def test_reproduce_writes_its_files_and_one_json_object(tmp_path, monkeypatch, kept):
     monkeypatch.setattr(mekf, "CONSISTENCY_STEPS", 60)
     monkeypatch.setattr(mekf, "DISPLACED_STEPS", 60)
     measure = mekf.measure
@@ -86,6 +87,7 @@ def test_reproduce_writes_its_files_and_one_json_object(tmp_path, monkeypatch):
     arguments = ["reproduce", "mekf", "--runs", "2", "--output", str(tmp_path), "--json"]
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == 0, result.output
+    kept("reproduce_mekf.txt", written(tmp_path))
     document = json.loads(result.stdout)
     row = document["contamination"][0]
     assert set(row) >= {"fraction", "outlier_sigma", "ekf", "igg", "huber", "hampel", "runs"}

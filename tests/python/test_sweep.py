@@ -7,7 +7,7 @@ import json
 import re
 import shutil
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from kept import written
 from typer.testing import CliRunner
 
 import auvest
@@ -399,7 +400,7 @@ def test_the_commands_of_the_page_run(
     assert json.loads(done.stdout)["missing_tasks"] == 12
 
 
-def test_the_command_writes_what_it_shows(tmp_path: Path) -> None:
+def test_the_command_writes_what_it_shows(tmp_path: Path, kept: Callable[[str, str], None]) -> None:
     config = tmp_path / "s.toml"
     config.write_text(
         '[sweep]\nscenario = "tracking"\nruns = 5\n[fixed]\nsteps = 5\n[grid]\n'
@@ -409,7 +410,7 @@ def test_the_command_writes_what_it_shows(tmp_path: Path) -> None:
     arguments = ["sweep", str(config), "--output", str(out), "--workers", "1"]
     done = CliRunner().invoke(app, arguments)
     assert done.exit_code == 0, done.output
-    assert "tracking: 4 points of 5 runs, seed 1" in done.stdout
+    kept("sweep.txt", done.stdout + done.stderr + written(out))
     result = auvest.sweep(config, output=out, workers=1)
     assert result.computed == 0
     mean, _ = result.values("rmse_m")

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from kept import written
 from typer.testing import CliRunner
 
 from auvest import mission_line, telemetry
@@ -320,7 +321,7 @@ def test_options_that_do_not_go_together(arguments: list[str], message: str) -> 
 
 
 def test_runs_that_are_flown_are_not_flown_again(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, kept: Callable[[str, str], None]
 ) -> None:
     """A board fails in run 1 of 3: the same command flies 1 and 2, and reports as of one go."""
     flown: list[int] = []
@@ -368,6 +369,7 @@ def test_runs_that_are_flown_are_not_flown_again(
     assert whole["stack_bytes"] == 1002
     assert whole["awake_share_simulated"] == pytest.approx(0.11)
     assert whole["awake_share_by_board"] == pytest.approx((0 + 900 + 1800) * 1e-6 * 59 / (3 * 5.9))
+    kept("mission.txt", written(tmp_path / "a"))
     runs = (tmp_path / "a" / "runs.csv").read_text()
     assert runs == (tmp_path / "b" / "runs.csv").read_text()
     assert (tmp_path / "a" / "samples.csv").read_text() == (
