@@ -25,6 +25,20 @@ def test_a_model_is_a_name_with_parameters():
             cost._call(text)
 
 
+@pytest.mark.parametrize(
+    ("column", "name"),
+    enumerate(["x[a]", "x[b]", "P[a, a]", "P[b, a]", "P[b, b]", "interval"]),
+)
+def test_the_first_bit_that_differs_is_named(column, name):
+    """Of a row: the state, the lower triangle of P row by row, the interval."""
+    desk = np.arange(12, dtype=np.float32).reshape(2, 6).view(np.uint32)
+    chip = desk.copy()
+    assert cost._first_difference(chip, desk, ["a", "b"]) is None
+    chip[1, column:] = np.float32(0.5).view(np.uint32)
+    said = f"row 1, {name}: 0.5 on the chip, {6 + column} on the desk"
+    assert cost._first_difference(chip, desk, ["a", "b"]) == said
+
+
 def test_parameters_that_differ_are_written_with_all_their_digits():
     model = cost._model("LeaderRange(sigma_range_m=0.1)", {}, None).model
     text = cost.made(model, "Sensor0", "make")

@@ -117,6 +117,22 @@ def test_foxglove(results: Path, tmp_path: Path) -> None:
     assert [one["nis"] for one in said] == measurements["nis"]
 
 
+def test_messages_stand_in_the_file_in_the_order_of_their_times(
+    results: Path, tmp_path: Path
+) -> None:
+    """Estimates and measurements are of two tables."""
+    reader = pytest.importorskip("mcap.reader", reason="mcap is not installed")
+    exported(results, tmp_path / "out")
+    with (tmp_path / "out" / "auvest.mcap").open("rb") as file:
+        messages = [
+            (channel.topic, message.log_time)
+            for _, channel, message in reader.make_reader(file).iter_messages(log_time_order=False)
+        ]
+    times = [time for _, time in messages]
+    assert times == sorted(times)
+    assert len({topic for topic, _ in messages[:20]}) > 1
+
+
 def test_the_ellipse_is_where_the_covariance_has_three_sigma(results: Path, tmp_path: Path) -> None:
     """d' P^-1 d is 9 on it; one a second."""
     reader = pytest.importorskip("mcap.reader", reason="mcap is not installed")

@@ -475,6 +475,7 @@ def test_a_craft_must_turn_by_something(tmp_path: Path) -> None:
         ("2025-11-28 09:00:00,250 +01:00", 1764316800.25),
         ("2025-11-28T03:30-0430", 1764316800.0),
         ("2025-11-28T08:00:00.123456789+00", 1764316800.123456789),
+        ("2016-12-31T23:59:60Z", 1483228800.0),  # a leap second is the next one's
     ],
 )
 def test_times_in_iso_8601(text: str, seconds: float) -> None:

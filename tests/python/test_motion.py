@@ -11,7 +11,7 @@ import pytest
 from auvest.logs import CsvTable, LogError
 from auvest.logs.write import write_file
 from auvest.replay.config import OdometrySettings
-from auvest.replay.motion import Motion, carry, dead_reckon, phi
+from auvest.replay.motion import Compass, Motion, carry, dead_reckon, phi
 
 SETTINGS = OdometrySettings()
 
@@ -93,6 +93,19 @@ def test_two_increments_at_one_time_are_refused_once_the_run_is_on(tmp_path: Pat
     with pytest.raises(LogError, match=r"two increments end at 2 s") as caught:
         motion.add(np.array(rows))  # the first of another chunk
     assert caught.value.column == "time_s"
+
+
+def test_what_the_compass_does_not_reach_yet_waits_with_its_own_time():
+    """Increments of 1, 2, 4 and 8 m; headings of 0.1 rad/s, first to 1.5 s, then to 3 s."""
+    compass = Compass(10.0, increments=True)
+    time, moved = np.arange(4.0), 2.0 ** np.arange(4) + 0j
+    early, late = ([[t, 0.1 * t] for t in times] for times in ((0.0, 1.5), (3.0,)))
+    done = compass.joined(time, moved, np.array(early), last=False)
+    rest = compass.joined(np.empty(0), np.empty(0, complex), np.array(late), last=True)
+    for found, expected in ((done, slice(0, 2)), (rest, slice(2, 4))):
+        assert found[0].tolist() == time[expected].tolist()
+        assert found[1].tolist() == moved[expected].tolist()
+        assert found[2] == pytest.approx(0.1 * time[expected], abs=1e-15)
 
 
 @pytest.mark.parametrize("lines", [1, 2, 3])

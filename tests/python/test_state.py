@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import json
 import pickle
 
 import numpy as np
@@ -142,6 +143,23 @@ def test_one_number_in_place_of_rows_is_refused_by_name():
         with pytest.raises(ValueError, match=f"^state is damaged: {name} has the shape"):
             f.restore(_state.pack("Ukf", description, other))
         assert f.save() == before
+
+
+def test_a_remembered_measurement_of_a_sensor_that_does_not_fit_is_refused():
+    """A depth is no number of a state that ends with a heading."""
+    start = np.zeros(3), np.eye(3)
+    f = auvest.Ekf(*start, process=auvest.Odometry(), sensors=auvest.LeaderRange((5, 0)), late_s=9)
+    f.predict(1.0, [1, 0])
+    f.update([4.0])
+    before, description = f.save(), f._description()
+    arrays = _state.unpack(before, "Ekf", description)
+    depth = json.dumps([_state.describe(auvest.Depth())]).encode()
+    arrays["event_models"] = np.frombuffer(depth, np.uint8)
+    with pytest.raises(
+        ValueError, match="models cannot be made: Depth observes x_m, y_m, z_m, but"
+    ):
+        f.restore(_state.pack("Ekf", description, arrays))
+    assert f.save() == before
 
 
 FOREIGN = {
