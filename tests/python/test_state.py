@@ -147,8 +147,8 @@ def test_one_number_in_place_of_rows_is_refused_by_name():
 
 def test_a_remembered_measurement_of_a_sensor_that_does_not_fit_is_refused():
     """A depth is no number of a state that ends with a heading."""
-    start = np.zeros(3), np.eye(3)
-    f = auvest.Ekf(*start, process=auvest.Odometry(), sensors=auvest.LeaderRange((5, 0)), late_s=9)
+    sensor = auvest.LeaderRange(leader=(5, 0))
+    f = auvest.Ekf(np.zeros(3), np.eye(3), process=auvest.Odometry(), sensors=sensor, late_s=9)
     f.predict(1.0, [1, 0])
     f.update([4.0])
     before, description = f.save(), f._description()
