@@ -44,14 +44,17 @@ def known_messages(request, monkeypatch, places):
 
 @pytest.fixture
 def kept(request, places):
-    """Return a function that compares a text with the one that is kept under a name."""
+    """Return a function that compares a text with the one that is kept under a name.
 
-    def kept(name, text):
-        path, now = FOLDER / name, short(neutral(text, places))
+    ``exact``: to the last digit, where no number is computed.
+    """
+
+    def kept(name, text, *, exact=False):
+        path, now = FOLDER / name, text if exact else short(neutral(text, places))
         if request.config.getoption("--renew"):
             path.write_text(now, encoding="utf-8")
         before = path.read_text(encoding="utf-8")
-        if not same(now, before):
+        if not (now == before if exact else same(now, before)):
             pytest.fail(f"{name}:\n{difference(now, before)}", pytrace=False)
 
     return kept

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
+import inspect
+import json
 import shlex
-from collections.abc import Callable
+from collections.abc import Iterator
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, Protocol
 
 import pytest
 from kept import written
@@ -15,15 +19,24 @@ from test_init import recorders
 from test_log_columns import spatial_log
 from test_replay import fixes_log, increments_log
 from test_replay_slat import sea
+from typer.main import get_command
 from typer.testing import CliRunner
 
+import auvest
+from auvest import guidance, metrics, vehicle
 from auvest.cli import app
 from auvest.commands.version import version
+from auvest.replay import config
 from auvest.replay.toml import settings_text
 from auvest.reproduce.mistakes import measure
 from auvest.reproduce.mistakes.injected import MISTAKES
+from auvest.simulation import cooperative, mission, slat, tracking
 
-Kept: TypeAlias = Callable[[str, str], None]
+
+class Kept(Protocol):
+    """The fixture of conftest.py."""
+
+    def __call__(self, name: str, text: str, *, exact: bool = False) -> None: ...
 
 
 def told(folder: Path, line: str) -> str:
@@ -32,6 +45,31 @@ def told(folder: Path, line: str) -> str:
     assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
     said = f"$ auvest {line}\n{done.stdout}{done.stderr}\nexit code {done.exit_code}\n"
     return said.replace(version(), "VERSION") + written(folder / "out")
+
+
+def test_arguments_and_their_defaults(kept: Kept) -> None:
+    """Of all that the package offers, its scenarios and the settings of a replay."""
+    places = (auvest, cooperative, mission, slat, tracking, vehicle, guidance, metrics, config)
+    lines = []
+    for place in places:
+        for name, one in sorted(vars(place).items()):
+            if callable(one) and not name.startswith("_") and "auvest" in str(one.__module__):
+                with contextlib.suppress(ValueError):  # of compiled ones
+                    lines.append(f"{place.__name__}.{name}{inspect.signature(one)}")
+    settings = json.dumps(asdict(config.Settings()), indent=1)
+    kept("arguments.txt", "\n".join([*dict.fromkeys(lines), settings, ""]), exact=True)
+
+
+def test_options_and_their_defaults(kept: Kept) -> None:
+    def options(command: Any, name: str) -> Iterator[str]:
+        for one in command.params:
+            yield f"{name} {' '.join(one.opts)} {one.default!r}"
+        if hasattr(command, "list_commands"):
+            with command.context_class(command) as context:
+                for word in command.list_commands(context):
+                    yield from options(command.get_command(context, word), f"{name} {word}")
+
+    kept("options.txt", "\n".join(options(get_command(app), "auvest")) + "\n", exact=True)
 
 
 SIMULATE = {

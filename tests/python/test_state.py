@@ -149,7 +149,7 @@ def test_a_remembered_measurement_of_a_sensor_that_does_not_fit_is_refused():
     """A depth is no number of a state that ends with a heading."""
     sensor = auvest.LeaderRange(leader=(5, 0))
     f = auvest.Ekf(np.zeros(3), np.eye(3), process=auvest.Odometry(), sensors=sensor, late_s=9)
-    f.predict(1.0, [1, 0])
+    f.predict(1.0, [1, 0, 0])
     f.update([4.0])
     before, description = f.save(), f._description()
     arrays = _state.unpack(before, "Ekf", description)
