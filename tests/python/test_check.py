@@ -359,11 +359,14 @@ def test_a_unit_of_speed_is_named(tmp_path: Path) -> None:
     """1852 m an hour are 0.514 m/s; what is 5 % off is a scale, and no unit."""
     settings = measure.trial("knots", "beacons", 3, tmp_path)
     told = {found.cause: found.text for found in check(tmp_path, settings).findings}
-    factor, unit = re.findall(r"times ([0-9.]+): told in (.+)\?", told["speed_scale"])[0]
+    factor, unit = re.findall(
+        r"times ([0-9.]+) \(written in (.+)\?\); each me", told["speed_scale"]
+    )[0]
     assert (float(factor), unit) == (pytest.approx(1852 / 3600, rel=0.03), "knots")
     log = LogFolder(tmp_path)
-    for scale, unit in ((0.48, ""), (0.3, ": told in feet per second?"), (0.28, ": told in km/h?")):
-        assert diagnosis._speeds(log, scale).message.endswith(f"{scale:.3f}{unit}")
+    for scale, unit in ((0.48, ""), (0.3, "feet per second"), (0.28, "km/h")):
+        written = unit and f" (written in {unit}?)"
+        assert diagnosis._speeds(log, scale).message.endswith(f"{scale:.3f}{written}")
 
 
 def test_speeds_that_are_too_small_are_a_scale_too(tmp_path: Path) -> None:
@@ -550,7 +553,7 @@ def test_command_shows_one_screen_and_refuses_what_is_no_folder(tmp_path: Path) 
     assert (strict.exit_code, strict.stdout) == (0, shown.stdout)
     refused = CliRunner().invoke(app, ["check", str(tmp_path / "nowhere")])
     assert refused.exit_code == 2
-    assert "is not a folder" in refused.stderr
+    assert refused.stderr == f"Error: LOG: {tmp_path / 'nowhere'}: there is no such folder\n"
 
 
 DATA = os.environ.get("AUVEST_DATA")

@@ -186,7 +186,8 @@ def test_the_command_writes_once(tmp_path: Path) -> None:
     assert path.read_text() == "# mine\n"
     assert call("init", tmp_path / "log", "--force", "--quiet").exit_code == 0
     assert path.read_text() != "# mine\n"
-    assert "is not a folder" in call("init", tmp_path / "nowhere").stderr
+    said = call("init", tmp_path / "nowhere").stderr
+    assert said == f"Error: LOG: {tmp_path / 'nowhere'}: there is no such folder\n"
 
 
 def test_the_command_says_what_it_took_for_what_and_what_is_wrong(tmp_path: Path) -> None:

@@ -46,11 +46,22 @@ HEAD = "time_s,source,range_m\n"
     [
         # truncated
         (HEAD + "1,0,5\n2,0,", 3, None, "truncated"),
-        (HEAD + "1,0,5\n2,0\n", 3, None, "2 cells, expected 3"),
+        (HEAD + "1,0,5\n2,0\n", 3, None, ": 2 cells, expected 3: truncated?"),
         (HEAD + "1,0,5\n2,0,6", 3, None, "line end"),
-        (HEAD + "1,0,5\n\n2,0,6\n", 3, None, "1 cells, expected 3"),
-        (HEAD + "\n1,0,5\n", 2, None, "1 cells, expected 3"),
-        (HEAD + "1,0,5,9\n", 2, None, "4 cells, expected 3"),
+        (HEAD + "1,0,5\n\n2,0,6\n", 3, None, ": 1 cell, expected 3: truncated?"),
+        (HEAD + "\n1,0,5\n", 2, None, ": 1 cell, expected 3: truncated?"),
+        (
+            HEAD + "1,0,5,9\n",
+            2,
+            None,
+            "4 cells, expected 3: a comma within a cell, or decimal commas?",
+        ),
+        (
+            HEAD + "1,0,5,x\n",
+            2,
+            None,
+            "4 cells, expected 3: a comma within a cell, or decimal commas?",
+        ),
         # NaN-ridden
         (HEAD + "1,0,nan\n", 2, "range_m", "leave out the row"),
         (HEAD + "1,0,5\nnan,0,5\n", 3, "time_s", "nan is not a number from"),
@@ -59,12 +70,35 @@ HEAD = "time_s,source,range_m\n"
         (HEAD + "1,0,1_0\n", 2, "range_m", "'1_0' is not a number"),
         (HEAD + "1,0,five\n", 2, "range_m", "'five' is not a number"),
         # wrong units
-        (HEAD + "1,0,5\n1665936896000,0,5\n", 3, "time_s", "milliseconds"),
+        (
+            HEAD + "1,0,5\n1665936896000,0,5\n",
+            3,
+            "time_s",
+            "1.665936896e+12 lies outside -1e+11..1e+11 s (milliseconds?)",
+        ),
+        (
+            HEAD + "1665936896000000,0,5\n",
+            2,
+            "time_s",
+            "1.665936896e+15 lies outside -1e+11..1e+11 s (microseconds?)",
+        ),
+        (
+            HEAD + "1665936896000000000,0,5\n",
+            2,
+            "time_s",
+            "1.665936896e+18 lies outside -1e+11..1e+11 s (nanoseconds?)",
+        ),
+        (HEAD + "-1e12,0,5\n", 2, "time_s", "column time_s: -1e+12 lies outside -1e+11..1e+11 s"),
         (HEAD + "1,0,-1\n", 2, "range_m", "no echo"),
-        (HEAD + "1,0,250000\n", 2, "range_m", "millimetres"),
-        (HEAD + "1,0.5,5\n", 2, "source", "an integer from 0"),
-        ("time_ms,source,range_m\n", 1, "time_ms", "expected time_s"),
-        ("time_s,source,range_km\n", 1, "range_km", "expected range_m"),
+        (
+            HEAD + "1,0,250000\n",
+            2,
+            "range_m",
+            "250000 lies outside 0..100000 m (millimetres, or a code for 'no echo'?)",
+        ),
+        (HEAD + "1,0.5,5\n", 2, "source", "0.5 is not an integer from 0 to 1000000000"),
+        ("time_ms,source,range_m\n", 1, "time_ms", "a log has time_s; auvest init"),
+        ("time_s,source,range_km\n", 1, "range_km", "a log has range_m; auvest init"),
         # not a log at all
         ("", 1, None, "the header must be time_s,source,range_m"),
         ("1,2,3\n", 1, None, "the header must be"),
@@ -260,7 +294,7 @@ def test_the_limits_of_a_column_are_read_and_nothing_beyond(
         assert read(table(float(limit)))[0, at] == limit
         step = math.copysign(1.0, beyond)
         next_one = limit + step if column.integer else math.nextafter(limit, beyond)
-        with pytest.raises(LogError, match=re.escape(f"is not {column.expected}")) as caught:
+        with pytest.raises(LogError, match=re.escape(f" lies outside {column.span}")) as caught:
             read(table(next_one))
         assert (caught.value.line, caught.value.column) == (2, column.name)
 
@@ -386,7 +420,7 @@ def test_a_folder_must_have_what_a_log_needs(tmp_path: Path, files: str, words: 
 
 def test_a_file_is_not_a_folder(tmp_path: Path) -> None:
     path = write(tmp_path, "ranges.csv", HEAD)
-    with pytest.raises(LogError, match="not a folder"):
+    with pytest.raises(LogError, match=r"ranges\.csv: is a file; a log is a folder of CSV files"):
         LogFolder(path)
 
 

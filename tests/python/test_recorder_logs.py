@@ -508,14 +508,15 @@ def test_rows_that_depend_on_other_files(tmp_path: Path) -> None:
     ("name", "raw", "message"),
     [
         ("a.csv", "t,x\n1,2\n1,2", r"a.csv, line 3: does not end with a line end: truncated"),
-        ("a.csv", "t,x\n1,2,3\n", r"a.csv, line 2: 3 cells, expected 2"),
+        ("a.csv", "t,x\n1,2,3\n", r"a.csv, line 2: 3 cells, expected 2: a comma within a"),
+        ("a.csv", "t,x\n1\n", r"a.csv, line 2: 1 cell, expected 2: truncated\?$"),
         ("a.csv", "t,x\n\n1,2\n", r"a.csv, line 2: is blank, and rows follow"),
         ("a.csv", "t,x\n1e400,2\n", r"a.csv, line 2: t is '1e400', which is no time in s"),
         ("a.csv", "t,t\n1,2\n", r"a.csv, line 1: has the column t twice"),
         ("a.csv", "1,2\n3,4\n", r"a.csv, line 1: '1' is not the name of a column"),
         ("a.json", '{"vx": 1', r"a.json, line 1: is not JSON"),
-        ("a.json", '{"vx": 1e999}\n', r"a.json, line 1: is not JSON: 1e999 is not a number"),
-        ("a.json", '{"vx": ' + "9" * 400 + "}\n", r"a.json, line 1: is not JSON: 9+ is not a num"),
+        ("a.json", '{"vx": 1e999}\n', r"a.json, line 1: is not JSON: 1e999 is too large a nu"),
+        ("a.json", '{"vx": ' + "9" * 400 + "}\n", r"JSON: 9999…9999 is too large a number$"),
         ("a.json", '{"vx": 1, "time": -5}\n', r"a.json, line 1: time is -5, which are no mill"),
         ("a.alog", "%% LOGSTART 1\n1 X\n", r"a.alog, line 2: 2 words; expected time"),
         ("a.alog", "%% LOGSTART 1\nnan X p 1\n", r"a.alog, line 2: 'nan' is no time in s"),
@@ -541,7 +542,7 @@ def test_what_does_not_follow_its_format_is_refused_by_its_place(
         ("inf", r"a.csv, line 3: x is 'inf', not a number"),
         ("1_000", r"a.csv, line 3: x is '1_000', not a number"),
         ("true", r"a.csv, line 3: x is 'True', not a number"),
-        ("3e7", r"a.csv, line 3: x_m would be 30000000, not a number from .*\(millimetres\?\)"),
+        ("3e7", r"a.csv, line 3: x_m: 30000000 lies outside -10000000\.\.10000000 m \(mill"),
     ],
 )
 def test_what_no_log_can_hold_is_refused_and_leaves_nothing(

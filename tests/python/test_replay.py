@@ -1002,7 +1002,9 @@ def test_command_says_what_was_not_used(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["nowhere"], "is not a folder"),
+        (["nowhere"], "nowhere: there is no such folder"),
+        (["log/ranges.csv"], "ranges.csv: is a file; a log is a folder of CSV files (auvest check"),
+        (["log", "--write", "none"], "'none' is not one of report, "),
         (["log", "./log"], "two logs have the name log"),
         (["log", "--config", "none.toml"], "none.toml: there is no such file"),
         (["log", "--filter", "aukf"], "filter aukf chooses"),

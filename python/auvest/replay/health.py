@@ -289,15 +289,13 @@ def findings(residuals: Residuals) -> list[Finding]:
                 "outliers apart"
             )
             found.append(finding("innovations", message))
+    found += _apart(rows, inside)
     least = max(RECOVERIES_DOUBTFUL, RECOVERY_SHARE * count)
     if residuals.recoveries >= least:
-        message = (
-            f"the filter lost its track {residuals.recoveries} times in {count} measurements: a "
-            "range scale, a wrong survey or sigmas that are too small"
-        )
+        message = f"the filter lost its track {residuals.recoveries} times in {count} measurements"
         bad = residuals.recoveries >= RECOVERIES_NOT_TRUSTED
         found.append(finding("recoveries", message, verdict="not_trusted" if bad else "doubtful"))
-    return found + _apart(rows, inside)
+    return found
 
 
 def _refused(residuals: Residuals) -> list[Finding]:

@@ -50,6 +50,7 @@ class Outage(Steps):
     def _prepare(self) -> None:
         self._exclusive = Exclusive()
         self._device = self._filter._device
+        self._settings = self._filter._settings
         name = f"SlatOutage_{self._motion.name}_{self._dtype.name}"
         self._core_steps = getattr(_core, name)(self._filter._core_steps)
 
