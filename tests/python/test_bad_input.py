@@ -135,7 +135,7 @@ CONSTRUCTORS = {
         ukf(sensors=None),
         TypeError,
         "sensors must be a measurement model, a sequence of them or a dict of them by name, "
-        "not NoneType",
+        "not None$",
     ),
     "sensors str": (ukf(sensors="sonar"), TypeError, "sensors must be a measurement .*, not str"),
     "a sensor": (

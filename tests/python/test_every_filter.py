@@ -1082,7 +1082,7 @@ def test_a_range_that_the_sensor_cannot_measure_is_refused_by_name(kind, name, d
         z[0] = -1.0
         with pytest.raises(
             FilterError,
-            match=rf"{sensor} cannot measure a range of -1 m; its ranges are 0 to inf m",
+            match=rf"{sensor} cannot measure a range of -1 m; its ranges are 0 m or more;",
         ) as caught:
             f.update(z, sensor)
         assert caught.value.status == Status.impossible_range

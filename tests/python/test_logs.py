@@ -100,22 +100,33 @@ HEAD = "time_s,source,range_m\n"
         ("time_ms,source,range_m\n", 1, "time_ms", "a log has time_s; auvest init"),
         ("time_s,source,range_km\n", 1, "range_km", "a log has range_m; auvest init"),
         # not a log at all
-        ("", 1, None, "the header must be time_s,source,range_m"),
+        ("", None, None, "ranges.csv: is empty; its first line must be time_s,source,range_m"),
+        ("\n", 1, None, "the header must be time_s,source,range_m, not blank"),
         ("1,2,3\n", 1, None, "the header must be"),
         ("time_s,source,range_m,range_m\n", 1, None, "the header must be"),
-        (HEAD + '1,0,5\n1,"0"\r,5\n', 3, None, "is no line of cells: new-line character"),
-        ('"time_s"\r,source,range_m\n', 1, None, "is no line of cells: new-line character"),
+        (
+            HEAD + '1,0,5\n1,"0"\r,5\n',
+            3,
+            None,
+            "line 3: has a carriage return within it: lines must end with LF or CRLF",
+        ),
+        (
+            '"time_s"\r,source,range_m\n',
+            1,
+            None,
+            "line 1: has a carriage return within it: lines must end with LF or CRLF",
+        ),
     ],
 )
 def test_refuses_with_file_line_and_column(
-    tmp_path: Path, text: str, line: int, column: str | None, words: str
+    tmp_path: Path, text: str, line: int | None, column: str | None, words: str
 ) -> None:
     path = write(tmp_path, "ranges.csv", text)
     with pytest.raises(LogError) as caught:
         read(path)
     assert (caught.value.path, caught.value.line, caught.value.column) == (path, line, column)
     assert words in str(caught.value)
-    assert str(caught.value).startswith(f"{path}, line {line}")
+    assert str(caught.value).startswith(f"{path}: " if line is None else f"{path}, line {line}")
 
 
 @pytest.mark.parametrize(

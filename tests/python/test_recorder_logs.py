@@ -510,6 +510,7 @@ def test_rows_that_depend_on_other_files(tmp_path: Path) -> None:
         ("a.csv", "t,x\n1,2\n1,2", r"a.csv, line 3: does not end with a line end: truncated"),
         ("a.csv", "t,x\n1,2,3\n", r"a.csv, line 2: 3 cells, expected 2: a comma within a"),
         ("a.csv", "t,x\n1\n", r"a.csv, line 2: 1 cell, expected 2: truncated\?$"),
+        ("a.csv", 't,x\n"1"\r,2\n', r"a.csv, line 2: has a carriage return within it: lines must"),
         ("a.csv", "t,x\n\n1,2\n", r"a.csv, line 2: is blank, and rows follow"),
         ("a.csv", "t,x\n1e400,2\n", r"a.csv, line 2: t is '1e400', which is no time in s"),
         ("a.csv", "t,t\n1,2\n", r"a.csv, line 1: has the column t twice"),
@@ -560,7 +561,7 @@ def test_times_that_go_back_are_said(tmp_path: Path) -> None:
     path = written(tmp_path, "a.csv", "t,x\n1,1\n3,2\n2,3\n4,4\n")
     settings = written(tmp_path, "m.toml", '[truth]\ntopic = "row"\nx_m = "x"\ny_m = 0\n')
     result = call("import", path, tmp_path / "log", "--mapping", settings, "--json")
-    assert "truth.csv: times go back 1 x" in json.loads(result.stdout)["notes"]
+    assert "truth.csv: times go back 1 time" in json.loads(result.stdout)["notes"]
     rows = np.loadtxt(tmp_path / "log" / "truth.csv", delimiter=",", skiprows=1)
     assert rows[:, 0].tolist() == [1, 3, 2, 4]
 
@@ -642,7 +643,17 @@ def test_a_missing_package_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     path = written(tmp_path, "dive.bag", b"#ROSBAG V2.0\n")
     result = call("import", "--list", path)
     assert result.exit_code == 2
-    assert "pip install 'auvest[ros]'" in result.stderr
+    needed = "ROS bags are read with the package rosbags: pip install 'auvest[ros]'"
+    assert result.stderr == f"Error: {needed}\n"
+
+
+def test_a_damaged_bag_is_refused_in_the_words_of_its_reader(tmp_path: Path) -> None:
+    pytest.importorskip("rosbags", reason="rosbags is not installed: pip install 'auvest[ros]'")
+    path = written(tmp_path, "dive.bag", b"#ROSBAG V2.0\n")
+    with pytest.raises(LogError) as caught:
+        listing(open_recording(path))
+    said = re.escape(f"{path}: is not a bag that can be read: ")
+    assert re.match(rf"{said}(?!\w*(Error|Exception):)\S", str(caught.value))
 
 
 def test_mapping_errors_are_no_log_errors() -> None:
