@@ -283,3 +283,9 @@ def test_the_page_is_what_was_measured_and_every_aim_is_reached() -> None:
     assert {one.set_name for one in recordings} == set(measure.RECORDINGS)
     assert all(bench.held().values())
     assert page.page(bench) == (PAGE / "README.md").read_text(encoding="utf-8")
+    alone = page.page(Bench(rows, []))
+    assert alone.startswith("# Constants\n\nMade by `auvest reproduce constants`; ")
+    for of_recordings in ("--data", "ecordings", "labyrinth", "hat_charles"):
+        assert of_recordings not in alone
+    assert alone.count("\n| ") == 2 + len(rows)
+    assert alone.endswith(" |\n")

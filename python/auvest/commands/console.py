@@ -189,7 +189,7 @@ def table(
     """Make a table; ``right`` are the columns that are flush right."""
     made = Table(title=Text(shown(title)), title_justify="left", title_style="bold")
     for number, name in enumerate(header):
-        made.add_column(name, justify="right" if number in right else "left")
+        made.add_column(name, justify="right" if number in right else "left", overflow="fold")
     for row in rows:
         made.add_row(*map(Text, row))
     return made
