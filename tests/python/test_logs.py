@@ -135,16 +135,40 @@ def test_refuses_with_file_line_and_column(
         ("fixes.csv", "time_s,source,range_m,bearing_rad\n1,0,5,90\n", "bearing_rad", "degrees"),
         ("odometry.csv", "time_s,forward_m,left_m,turn_rad\n1,0,0,45\n", "turn_rad", "degrees"),
         ("odometry.csv", "time_s,speed_m_s,yaw_rate_rad_s\n1,1500,0\n", "speed_m_s", "milli"),
-        ("truth.csv", "time_s,x_m,y_m,heading_rad\n1,0,0,180\n", "heading_rad", "degrees"),
+        (
+            "truth.csv",
+            "time_s,x_m,y_m,heading_rad\n1,0,0,180\n",
+            "heading_rad",
+            "180 lies outside -6.283285307..6.283285307 rad (degrees?)",
+        ),
+        (
+            "water.csv",
+            "time_s,temperature_c\n1,283\n",
+            "temperature_c",
+            "283 lies outside -5..60 (kelvin?)",
+        ),
+        (
+            "water.csv",
+            "time_s,temperature_c\n1,-999\n",
+            "temperature_c",
+            "-999 lies outside -5..60 (a code for 'no value'?)",
+        ),
     ],
 )
 def test_suspects_the_unit(
     tmp_path: Path, name: str, text: str, column: str, suspicion: str
 ) -> None:
     path = write(tmp_path, name, text)
-    with pytest.raises(LogError, match=suspicion) as caught:
+    with pytest.raises(LogError, match=re.escape(suspicion)) as caught:
         read(path)
     assert caught.value.column == column
+
+
+def test_a_full_turn_that_was_rounded_is_read(tmp_path: Path) -> None:
+    """6.28319 is 2 pi to five decimals, 6.2832 to four."""
+    text = "time_s,heading_rad\n0,6.28319\n1,-6.2832\n"
+    rows = read(write(tmp_path, "compass.csv", text))
+    np.testing.assert_array_equal(rows[:, 1], [6.28319, -6.2832])
 
 
 @pytest.mark.parametrize("lines", [1, 2, 1000])

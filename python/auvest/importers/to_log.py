@@ -203,7 +203,8 @@ class _Writing:
                 self._left_out[f"messages of {message.topic} without {column.name}"] += 1
                 return
             if not column.low <= value <= column.high or (column.integer and value % 1):
-                hint = f" ({column.suspicion})" if column.suspicion else ""
+                suspicion, _ = column.suspect(value)
+                hint = f" ({suspicion})" if suspicion else ""
                 raise RecordingError(
                     recording.path, message.where,
                     f"{column.name}: {column.breach(value)}{hint}",

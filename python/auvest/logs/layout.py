@@ -14,7 +14,8 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-_TURN = 2 * math.pi + 1e-4  # a full turn, however it was rounded
+#: A full turn, however it was rounded.
+TURN = 2 * math.pi + 1e-4
 
 Unit: TypeAlias = Literal["s", "m", "m/s", "rad", "rad/s", "deg", ""]
 
@@ -114,7 +115,7 @@ def _speed(name: str) -> Column:
 
 
 def _angle(name: str) -> Column:
-    return Column(name, -_TURN, _TURN, "degrees?", cause="degrees")
+    return Column(name, -TURN, TURN, "degrees?", cause="degrees")
 
 
 #: Every column that a file can have, by its name.
