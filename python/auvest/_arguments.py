@@ -17,7 +17,7 @@ from typing import Any, Literal, NoReturn, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from auvest._texts import either
+from auvest._texts import counted, either
 
 Floats: TypeAlias = npt.NDArray[np.floating[Any]]
 DType: TypeAlias = np.dtype[np.float32] | np.dtype[np.float64]
@@ -278,7 +278,9 @@ def as_steps(dt: npt.ArrayLike, rows: int, dtype: DType, name: str = "dt") -> Fl
         return np.full(rows, as_step(dt, dtype, name), dtype)
     steps = as_array(name, dt, (None,), dtype)
     if len(steps) != rows:
-        raise ValueError(f"{name} has {len(steps)} rows and z has {rows}; they must have the same")
+        raise ValueError(
+            f"{name} has {counted(len(steps), 'row')} and z has {rows}; they must have the same"
+        )
     if (steps < 0).any():
         k = int(np.argmax(steps < 0))
         raise ValueError(f"{name}[{k}] must not be negative, not {steps[k]}")

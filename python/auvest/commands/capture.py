@@ -34,7 +34,7 @@ import typer
 from rich.table import Table
 
 from auvest import MahalanobisInterval, RangeBearing, metrics, telemetry
-from auvest._texts import NIS_OFF, os_reason, then
+from auvest._texts import NIS_OFF, counted, os_reason, then
 from auvest.board import Board, BoardError, Finished, PinChange, SerialLine
 from auvest.commands import options
 from auvest.commands.console import Terminal, table
@@ -543,7 +543,7 @@ def _count(values: Floats) -> int | float:
 def _figure(recording: Recording, sensor: RangeBearing, source: str) -> Figure:
     from auvest import plots  # here, because matplotlib takes long to import
 
-    title = f"{Path(source).name}: {len(recording.rows)} samples"
+    title = f"{Path(source).name}: {counted(len(recording.rows), 'sample')}"
     if not {"x_m", "y_m", "nis", "interval_s", "range_m"} <= set(recording.rows[0]):
         drawn = [name for name in recording.rows[0] if name not in ("section", "sample", "time_s")]
         return plots.columns_figure(
@@ -594,5 +594,5 @@ def _table(values: dict[str, Any], source: str) -> Table:
         rows.append(("worst timing error / ms", f"{error:.3f}", "trigger against commanded moment"))
     if math.isfinite(values["rmse_m"]):
         rows.append(("position RMSE / m", f"{values['rmse_m']:.4f}", "against the simulated truth"))
-    title = f"{source}: {values['samples']} samples in {values['duration_s']:.1f} s"
+    title = f"{source}: {counted(values['samples'], 'sample')} in {values['duration_s']:.1f} s"
     return table(title, ("quantity", "value", "note"), rows, right={1})

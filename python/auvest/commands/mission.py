@@ -461,7 +461,7 @@ def _table(values: dict[str, Any], source: str) -> Table:
     if simulated:
         rows.insert(10, ("deepest stack / B", f"{values['stack_bytes']}", ""))
     title = (
-        f"{source}: {values['finished_runs']} of {values['runs']} runs to the end, "
+        f"{source}: {values['finished_runs']} of {counted(values['runs'], 'run')} to the end, "
         f"{counted(values['samples'], 'sample')}"
     )
     return table(title, ("quantity", "value", "note"), rows, right={1})

@@ -41,6 +41,7 @@ from auvest._arguments import (
 from auvest._core import Convergence, Decision, Status
 from auvest._interrupts import first_slice, in_slices
 from auvest._state import describe, pack, require, unpack
+from auvest._texts import counted
 from auvest.errors import FilterError, Interrupted
 from auvest.filters._many import is_stack, run_many
 from auvest.filters.results import Mixture, Report, RunResult, SmoothResult
@@ -1329,4 +1330,6 @@ def _require_rows(name: str, array: Floats, rows: int) -> None:
 
 
 def _refuse_rows(name: str, have: int, rows: int, other: str = "z") -> NoReturn:
-    raise ValueError(f"{name} has {have} rows and {other} has {rows}; they must have the same")
+    raise ValueError(
+        f"{name} has {counted(have, 'row')} and {other} has {rows}; they must have the same"
+    )

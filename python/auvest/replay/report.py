@@ -14,7 +14,7 @@ from html import escape
 from importlib import resources
 from typing import Any
 
-from auvest._texts import beside
+from auvest._texts import beside, counted
 from auvest.registry import filter_named
 from auvest.replay import drawing, tables
 from auvest.replay.constants import Found
@@ -235,7 +235,8 @@ def sources(health: Health) -> list[tuple[str, str]]:
     return [
         (
             f"source {one.source}",
-            f"{one.measurements} measurements, {100 * one.beyond_share:.0f} % beyond three sigma, "
+            f"{counted(one.measurements, 'measurement')}, "
+            f"{100 * one.beyond_share:.0f} % beyond three sigma, "
             f"median {one.median_m:+.2f} m, spread {one.spread_m:.2f} m, "
             f"{100 * one.trend:+.2f} % of the range",
         )

@@ -549,7 +549,9 @@ class Steps:
         numbers = np.ascontiguousarray(np.broadcast_to(raw, (count,)), dtype=np.int64)
         for number in np.unique(numbers):
             if not UNKNOWN_MASTER <= number < masters:
-                raise ValueError(f"master is {number}, but the filter has {masters} masters")
+                raise ValueError(
+                    f"master is {number}, but the filter has {counted(masters, 'master')}"
+                )
             if self._shared and number == UNKNOWN_MASTER:
                 raise ValueError(_NEEDS_KNOWN)
         return numbers
