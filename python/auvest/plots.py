@@ -667,7 +667,7 @@ def nis(
     >>> from auvest import plots
     >>> values = np.random.default_rng(1).chisquare(2, size=200)
     >>> plots.nis(values, 2).axes[0].get_title(loc="left")
-    'mean of all: 2.10, consistent: 1.73 to 2.29 (95 %)'
+    'mean of all: 2.10, within the consistent 1.73 to 2.29 (95 %)'
     """
     return _consistency_figure("NIS", np.asarray(values, np.float64), dof, time_s, level, title)
 
