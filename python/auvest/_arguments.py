@@ -17,13 +17,18 @@ from typing import Any, Literal, NoReturn, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from auvest._texts import either
+from auvest._texts import counted, either
 
 Floats: TypeAlias = npt.NDArray[np.floating[Any]]
 DType: TypeAlias = np.dtype[np.float32] | np.dtype[np.float64]
 
 #: Rows that one call takes at most; a filter goes on where it stopped, so records can be split.
 MAX_ROWS = 10_000_000
+
+
+def type_name(value: object) -> str:
+    """Return the name of a value's type; None is called so."""
+    return "None" if value is None else type(value).__name__
 
 
 def as_dtype(value: object) -> DType:
@@ -43,7 +48,7 @@ def as_dtype(value: object) -> DType:
 def as_kind(name: str, value: object, kinds: tuple[str, ...]) -> str:
     """Take one of a few names."""
     if not isinstance(value, str):
-        raise TypeError(f"{name} must be a str, not {type(value).__name__}")
+        raise TypeError(f"{name} must be a str, not {type_name(value)}")
     if value not in kinds:
         raise ValueError(f"{name} must be {either(map(repr, kinds))}, not {value!r}")
     return value
@@ -59,7 +64,7 @@ def as_instance(name: str, value: object, expected: type | tuple[type, ...]) -> 
     if not isinstance(value, expected):
         types = expected if isinstance(expected, tuple) else (expected,)
         names = " or ".join(f"auvest.{t.__name__}" for t in types)
-        raise TypeError(f"{name} must be an {names}, not {type(value).__name__}")
+        raise TypeError(f"{name} must be an {names}, not {type_name(value)}")
     return value
 
 
@@ -98,7 +103,7 @@ def _is_number(value: object, kind: type) -> bool:
 
 def as_integer(name: str, value: object, low: int, high: int) -> int:
     if not _is_number(value, numbers.Integral):
-        raise _not_a_number(name, "an integer", type(value).__name__)
+        raise _not_a_number(name, "an integer", type_name(value))
     number = int(value)  # type: ignore[call-overload]
     if not low <= number <= high:
         raise ValueError(f"{name} must lie in {low}..{high}, not {number}")
@@ -114,11 +119,11 @@ def as_number(name: str, value: object, bound: Bound = "any", *, infinite: bool 
         value = value[()]
     if not _is_number(value, numbers.Real):
         shape = f" of shape {value.shape}" if isinstance(value, np.ndarray) else ""
-        raise _not_a_number(name, "a number", f"{type(value).__name__}{shape}")
+        raise _not_a_number(name, "a number", f"{type_name(value)}{shape}")
     try:
         number = float(value)  # type: ignore[arg-type]
     except OverflowError:
-        number = math.inf
+        raise ValueError(f"{name} is beyond the range of float64") from None
     if not math.isfinite(number) and not (infinite and number == math.inf):
         raise ValueError(f"{name} must be finite, not {value}")
     if bound == "positive" and number <= 0:
@@ -140,10 +145,16 @@ def require_range(
             raise ValueError(f"{name} = {value} does not suit {dtype}: {what} leaves its range")
 
 
+#: No coordinates of a place on Earth are larger, m.
+_NO_PLACE_M = 1e9
+
+
 def far_from_origin(name: str, place: Floats, dtype: DType) -> str:
     """Say that coordinates, m, are too large for a precision, and what to do."""
     coordinates = [float(value) for value in place if math.isfinite(value)]
     largest = max(coordinates, key=abs)
+    if abs(largest) > _NO_PLACE_M:
+        return f"{name}[{coordinates.index(largest)}] = {largest:.6g} m is no place on Earth"
     step = float(np.spacing(np.abs(dtype.type(largest))))
     unit = 10.0 ** max(0, math.floor(math.log10(abs(largest))) - 2)
     origin = ", ".join(f"{round(value / unit) * unit:.0f}" for value in coordinates)
@@ -174,11 +185,21 @@ def warn_of_degrees(argument: str, names: Sequence[str], rows: Floats, stackleve
             )
 
 
+def step_too_long(step: str, longest_s: float) -> str:
+    """Say that a step is longer than a filter takes, and what may lie behind it."""
+    return (
+        f"{step} is longer than longest_step_s = {longest_s:g} s: did the clock jump, or is it in "
+        "another unit?"
+    )
+
+
 def impossible_range(name: str, range_m: float, limits: Any) -> str:
     """Say that an instrument called ``name`` cannot have measured a range."""
     known = ""
     if hasattr(limits, "smallest_range_m") and hasattr(limits, "largest_range_m"):
-        known = f"; its ranges are {limits.smallest_range_m:g} to {limits.largest_range_m:g} m"
+        most = limits.largest_range_m
+        to = f"to {most:g} m" if math.isfinite(most) else "m or more"
+        known = f"; its ranges are {limits.smallest_range_m:g} {to}"
     return f"{name} cannot measure a range of {range_m:g} m{known}; NaN is for no measurement"
 
 
@@ -257,7 +278,9 @@ def as_steps(dt: npt.ArrayLike, rows: int, dtype: DType, name: str = "dt") -> Fl
         return np.full(rows, as_step(dt, dtype, name), dtype)
     steps = as_array(name, dt, (None,), dtype)
     if len(steps) != rows:
-        raise ValueError(f"{name} has {len(steps)} rows and z has {rows}; they must have the same")
+        raise ValueError(
+            f"{name} has {counted(len(steps), 'row')} and z has {rows}; they must have the same"
+        )
     if (steps < 0).any():
         k = int(np.argmax(steps < 0))
         raise ValueError(f"{name}[{k}] must not be negative, not {steps[k]}")
@@ -290,9 +313,10 @@ def _refuse_element(
             f"{where} is {element}: beyond the range of {dtype.name}, which ends at {largest:.3g}"
         )
     if missing and np.isnan(element):
+        what = "measurement" if name == "z" else name
         raise ValueError(
-            f"{where} is nan and the rest of the measurement is not; "
-            "a missing measurement is NaN throughout"
+            f"{where} is nan and the rest of the {what} is not; a {what} that is missing is NaN "
+            "throughout"
         )
     raise ValueError(f"{where} is {element}; all elements must be finite")
 

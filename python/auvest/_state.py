@@ -29,6 +29,8 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from auvest._arguments import type_name
+
 #: The version that :func:`pack` writes, the only one that :func:`unpack` takes.
 VERSION = 1
 
@@ -155,11 +157,13 @@ def describe(value: Any) -> Any:
 def _open(state: object) -> tuple[dict[str, Any], memoryview]:
     """Give the header of a state that is whole, and its arrays."""
     if not isinstance(state, (bytes, bytearray, memoryview)):
-        raise TypeError(f"state must be bytes from save(), not {type(state).__name__}")
+        raise TypeError(f"state must be bytes from save(), not {type_name(state)}")
     raw = memoryview(bytes(state))
-    if len(raw) < _PREFIX.size + _CHECKSUM.size or bytes(raw[: len(_MAGIC)]) != _MAGIC:
-        start = bytes(raw[: len(_MAGIC)])
+    start, least = bytes(raw[: len(_MAGIC)]), _PREFIX.size + _CHECKSUM.size
+    if not _MAGIC.startswith(start):
         raise ValueError(f"state is not from save(): it begins with {start!r}, expected {_MAGIC!r}")
+    if len(raw) < least:
+        raise ValueError(f"state is cut short: it has {len(raw)} bytes, a state at least {least}")
     _, version, length, header_length = _PREFIX.unpack_from(raw)
     if len(raw) != length:
         raise ValueError(f"state is damaged: it has {len(raw)} bytes, expected {length}")

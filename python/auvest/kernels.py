@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from auvest import _core
-from auvest._arguments import as_array, as_kind, require_range
+from auvest._arguments import as_array, as_kind, require_range, type_name
 from auvest._fields import Checked, integer, positive
 
 if TYPE_CHECKING:
@@ -138,7 +138,7 @@ def as_kernel(kernel: object) -> Kernel:
         return KERNELS[as_kind("kernel", kernel, tuple(KERNELS))]()
     raise TypeError(
         "kernel must be an auvest.Igg, Huber, Hampel or Unit, or a name of one, "
-        f"not {type(kernel).__name__}"
+        f"not {type_name(kernel)}"
     )
 
 

@@ -22,7 +22,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from auvest._arguments import as_integer, as_workers
+from auvest._arguments import as_integer, as_workers, type_name
 from auvest._outputs import UNFINISHED, new_file
 from auvest.errors import Interrupted as Interrupted
 
@@ -114,7 +114,7 @@ def run(
     size = as_integer("chunk", chunk, 1, 2**53)
     threads = as_workers(workers)
     if progress is not None and not callable(progress):
-        raise TypeError(f"progress must be callable, not {type(progress).__name__}")
+        raise TypeError(f"progress must be callable, not {type_name(progress)}")
     if store is not None and settings is None:
         raise TypeError("settings must be given with a store: they say whose results it holds")
 

@@ -26,6 +26,7 @@ from auvest import metrics
 from auvest._arguments import as_array, as_instance, as_real
 from auvest._core import Decision
 from auvest._outputs import new_file
+from auvest._texts import beside
 from auvest.filters.results import RunResult, RunsResult
 
 Floats = npt.NDArray[np.float64]
@@ -666,7 +667,7 @@ def nis(
     >>> from auvest import plots
     >>> values = np.random.default_rng(1).chisquare(2, size=200)
     >>> plots.nis(values, 2).axes[0].get_title(loc="left")
-    'mean of all: 2.10, consistent: 1.73 to 2.29 (95 %)'
+    'mean of all: 2.10, within the consistent 1.73 to 2.29 (95 %)'
     """
     return _consistency_figure("NIS", np.asarray(values, np.float64), dof, time_s, level, title)
 
@@ -700,9 +701,10 @@ def _consistency_figure(
     axes.axhline(dof, color=BLACK, linewidth=0.8, linestyle="--", label=f"expected: {dof}")
     axes.plot(x, mean, ".-", color=BLUE, linewidth=1.2, markersize=3.5, label=name)
     what = "all" if name == "NIS" else "the runs at the last step"
+    where = beside(judged.mean, judged.low, judged.high)
     style(
         axes,
-        title=f"mean of {what}: {judged.mean:.2f}, consistent: {judged.low:.2f} to "
+        title=f"mean of {what}: {judged.mean:.2f}, {where} the consistent {judged.low:.2f} to "
         f"{judged.high:.2f} ({100 * level:g} %)",
         xlabel="step" if time_s is None else "time / s",
         ylabel=name if len(runs) == 1 else f"{name}, mean of {len(runs)} runs",

@@ -24,6 +24,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from auvest._texts import counted
+
 #: One sample; NaN where the sketch had nothing to send.
 Row = dict[str, float]
 
@@ -224,7 +226,10 @@ class Reader:
 
     def _sample(self, line: str, cells: list[str]) -> Row:
         if len(cells) != len(self.columns):
-            raise LineError(f"{len(cells)} values for {len(self.columns)} columns: {line!r}")
+            raise LineError(
+                f"{counted(len(cells), 'value')} for {counted(len(self.columns), 'column')}: "
+                f"{line!r}"
+            )
         try:
             pairs = zip(self.columns, cells, strict=True)
             return {name: _value(cell, whole=name in self._whole) for name, cell in pairs}

@@ -251,7 +251,12 @@ def test_slat_takes_no_start_that_leaves_no_room(kind):
     """Coordinates that are coarse, and variances whose sums or inverses are no numbers."""
     eye = np.eye(2)
     for x, P, why in (
-        ([0, 1e38], 1e-5 * eye, "too far from the origin: float32 tells"),
+        ([0, 1e38], 1e-5 * eye, r"^x0?\[1\] = 1e\+38 m is no place on Earth$"),
+        (
+            [0, 9e8],
+            1e-5 * eye,
+            r"^x0? = \(0, 900000000\) is too far from the origin: float32 tells",
+        ),
         ([5e5, 4.2e6], 1e-2 * eye, r"origin, such as \(500000, 4200000\)"),
         ([0, 0], 1e36 * eye, "would not be finite"),
         ([0, 0], 1e-38 * eye, "would not be finite"),

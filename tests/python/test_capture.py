@@ -30,6 +30,7 @@ from processes import PATIENCE_S, lines_of, start_program, wait_until
 from typer.testing import CliRunner, Result
 
 from auvest import board, telemetry
+from auvest._texts import then
 from auvest.cli import app
 from auvest.commands import capture
 from auvest.commands.capture import SimulatedSonar
@@ -608,7 +609,14 @@ def test_wrong_usage_names_the_option(
 def test_a_port_that_is_not_there(tmp_path: Path) -> None:
     result = call("--port", "/dev/no-such-port", "--output", str(tmp_path))
     assert result.exit_code == 1
-    assert "/dev/no-such-port" in plain(result.stderr)
+    said = "Error: no sample has come: /dev/no-such-port: No such file or directory"
+    assert plain(result.stderr) == said
+
+
+def test_a_question_ends_its_sentence() -> None:
+    rest = "the samples until then are kept"
+    assert then("is it at 9600 baud?", rest) == f"is it at 9600 baud? T{rest[1:]}"
+    assert then("it is gone", rest) == f"it is gone; {rest}"
 
 
 def test_without_pyserial_the_extra_is_named(

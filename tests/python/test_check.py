@@ -9,6 +9,7 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -20,9 +21,9 @@ from auvest.cli import app
 from auvest.importers.sets import IMPORTERS
 from auvest.logs import LogError, LogFolder, reader
 from auvest.logs.check import survey
-from auvest.logs.findings import CAUSES, worst
+from auvest.logs.findings import CAUSES, Finding, finding, worst
 from auvest.logs.write import write_file
-from auvest.replay import Settings, diagnosis, find_settings, replay, report, settings_from
+from auvest.replay import Settings, checks, diagnosis, find_settings, replay, report, settings_from
 from auvest.replay.checks import Checked, check, files, limits
 from auvest.replay.health import (
     RECOVERIES_NOT_TRUSTED,
@@ -141,7 +142,9 @@ def test_a_file_that_no_log_has_is_a_note(tmp_path: Path) -> None:
         ("ignored_file", "battery.csv", None),
         ("ignored_file", "range.csv", None),
     ]
-    assert "meant to be ranges.csv" in checked.findings[1].message
+    said = "is not read: no file of a log has that name"
+    listed, meant = " (auvest check --layout lists them)", "; is it meant to be ranges.csv?"
+    assert [one.message for one in checked.findings] == [said + listed, said + meant]
     assert checked.verdict == "sound"
 
 
@@ -341,6 +344,39 @@ def test_a_clean_trial_is_sound_and_one_with_tenth_sigmas_is_not(kind: str, tmp_
     assert "noise_too_small" in measure.causes(checked)
 
 
+@pytest.mark.parametrize("others", [[], [finding("innovations", "they do not fit")]])
+def test_recoveries_have_possible_causes_where_nothing_else_is_wrong(
+    monkeypatch: pytest.MonkeyPatch, others: list[Finding]
+) -> None:
+    lost = finding("recoveries", "the filter lost its track 9 times in 99 measurements")
+    monkeypatch.setattr(checks, "start_findings", lambda _: [])
+    monkeypatch.setattr(checks, "findings", lambda _: [*others, lost])
+    monkeypatch.setattr(diagnosis, "diagnose", lambda *_, **__: [])
+    log: Any = SimpleNamespace(echoing=False)
+    left: Any = None
+    *_, told = checks.innovations(log, Settings(), "ekf", left, [])
+    causes = "; possible causes: a range scale, a wrong survey or sigmas that are too small"
+    assert told.message == lost.message + ("" if others else causes)
+
+
+@pytest.mark.parametrize(
+    ("step", "said"),
+    [
+        (2e3, "2000 s apart, 200000 s in all: milliseconds for seconds? Then they are 2 s apart"),
+        (2e6, "2000000 s apart, 200000000 s in all: microseconds for seconds? Then they are 2 s"),
+        (5e8, "500000000 s apart, 5e+10 s in all: nanoseconds for seconds? Then they are 0.5 s"),
+    ],
+)
+def test_a_clock_that_is_too_fast_is_told_its_unit(tmp_path: Path, step: float, said: str) -> None:
+    arc(tmp_path)
+    time = step * np.arange(101)
+    still = np.zeros(len(time))
+    write_file(tmp_path, "odometry.csv", time_s=time, speed_m_s=still, yaw_rate_rad_s=still)
+    cause = "milliseconds" if step < 1e4 else "microseconds"
+    (told,) = [one for one in check(tmp_path, Settings()).findings if one.cause == cause]
+    assert told.message.startswith(f"lines are {said}")
+
+
 def test_recoveries_again_and_again_are_not_trusted(tmp_path: Path) -> None:
     """Ranges that are too long by a scale against sigmas that leave no room for it."""
     random = np.random.default_rng(5)
@@ -359,11 +395,14 @@ def test_a_unit_of_speed_is_named(tmp_path: Path) -> None:
     """1852 m an hour are 0.514 m/s; what is 5 % off is a scale, and no unit."""
     settings = measure.trial("knots", "beacons", 3, tmp_path)
     told = {found.cause: found.text for found in check(tmp_path, settings).findings}
-    factor, unit = re.findall(r"times ([0-9.]+): told in (.+)\?", told["speed_scale"])[0]
+    factor, unit = re.findall(
+        r"times ([0-9.]+) \(written in (.+)\?\); each me", told["speed_scale"]
+    )[0]
     assert (float(factor), unit) == (pytest.approx(1852 / 3600, rel=0.03), "knots")
     log = LogFolder(tmp_path)
-    for scale, unit in ((0.48, ""), (0.3, ": told in feet per second?"), (0.28, ": told in km/h?")):
-        assert diagnosis._speeds(log, scale).message.endswith(f"{scale:.3f}{unit}")
+    for scale, unit in ((0.48, ""), (0.3, "feet per second"), (0.28, "km/h")):
+        written = unit and f" (written in {unit}?)"
+        assert diagnosis._speeds(log, scale).message.endswith(f"{scale:.3f}{written}")
 
 
 def test_speeds_that_are_too_small_are_a_scale_too(tmp_path: Path) -> None:
@@ -550,7 +589,7 @@ def test_command_shows_one_screen_and_refuses_what_is_no_folder(tmp_path: Path) 
     assert (strict.exit_code, strict.stdout) == (0, shown.stdout)
     refused = CliRunner().invoke(app, ["check", str(tmp_path / "nowhere")])
     assert refused.exit_code == 2
-    assert "is not a folder" in refused.stderr
+    assert refused.stderr == f"Error: LOG: {tmp_path / 'nowhere'}: there is no such folder\n"
 
 
 DATA = os.environ.get("AUVEST_DATA")

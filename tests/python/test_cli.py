@@ -151,7 +151,8 @@ def test_output_that_is_a_file_is_refused(tmp_path: Path) -> None:
     assert "--output" in plain(result.stderr)
     below = call("simulate", "aukf", *QUICK, "--output", str(path / "below"))
     assert below.exit_code == 1
-    assert "cannot write there" in plain(below.stderr)
+    said = f"Error: --output {path / 'below'}: {path} is a file, not a folder"
+    assert plain(below.stderr) == said
     assert below.stdout == ""
 
 

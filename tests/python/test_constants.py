@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,11 +17,11 @@ from typer.testing import CliRunner
 import auvest
 from auvest.cli import app
 from auvest.importers.sets import IMPORTERS
-from auvest.logs import LogFolder
+from auvest.logs import LogError, LogFolder
 from auvest.logs.write import write_file
 from auvest.replay import Settings, find_settings, replay, report, settings_from
 from auvest.replay.constants import Constants, Found
-from auvest.replay.water import sound_speed_m_s
+from auvest.replay.water import range_changes, sound_speed_m_s
 from auvest.reproduce.constants import measure, page, trials
 from auvest.reproduce.constants.measure import Bench, Recording, Row
 
@@ -76,7 +77,7 @@ def test_what_cannot_be(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="is for turns and yaw rates"):
         replay(steered, settings(constants={"turn_offset_rad_s": 0.1}))
     for place in (1, 2, 8):
-        with pytest.raises(ValueError, match="speed_state"):
+        with pytest.raises(ValueError, match=rf"^speed_state must be 0 or 3\.\.7, not {place}$"):
             auvest.OdometryConstants(speed_state=place)
 
 
@@ -188,9 +189,43 @@ def test_the_speed_of_sound() -> None:
     # Fresh water at 20 °C: 1482.3 m/s (Del Grosso and Mader 1972).
     assert sound_speed_m_s(20.0, 0.0, 0.0) == pytest.approx(1482.3, abs=1.0)
     assert sound_speed_m_s([4, 20], 35, [0, 100]).shape == (2,)
-    for bad in ((-1, 35, 0), (36, 35, 0), (10, 46, 0), (10, 35, 1001), (10, 35, np.nan)):
-        with pytest.raises(ValueError, match="where the formula holds"):
+    for bad, said in (
+        ((-1, 35, 0), "temperature_c must lie in 0..35, where the formula holds, not -1"),
+        ((36, 35, 0), "temperature_c must lie in 0..35, where the formula holds, not 36"),
+        (([10, 37], 35, 0), "temperature_c must lie in 0..35, where the formula holds, not 37"),
+        ((10, 46, 0), "salinity_psu must lie in 0..45, where the formula holds, not 46"),
+        ((10, 35, 1001), "depth_m must lie in 0..1000, where the formula holds, not 1001"),
+        ((10, 35, np.nan), "depth_m must lie in 0..1000, where the formula holds, not nan"),
+    ):
+        with pytest.raises(ValueError, match=f"^{re.escape(said)}$"):
             sound_speed_m_s(*bad)
+
+
+@pytest.mark.parametrize(
+    ("water", "depth_m", "psu", "said"),
+    [
+        (
+            "1,20,35\n0,37,35\n",
+            0,
+            35,
+            "water.csv, line 3, column temperature_c: 37 is outside 0..35",
+        ),
+        ("0,20,50\n", 0, 35, "water.csv, line 2, column salinity_psu: 50 is outside 0..45"),
+        ("0,20\n", 0, 50, "water.csv: [water] salinity_psu: 50 is outside 0..45"),
+        ("0,20\n", 1350, 35, "depth.csv, column depth_m: 1350 is outside 0..1000 m"),
+    ],
+)
+def test_water_beyond_the_formula_is_named(
+    tmp_path: Path, water: str, depth_m: float, psu: float, said: str
+) -> None:
+    log = trials.write(tmp_path, "range_scale", 0.0, 0).path
+    salinity = ",salinity_psu" * (water.split("\n")[0].count(",") > 1)
+    (log / "water.csv").write_text(f"time_s,temperature_c{salinity}\n{water}")
+    (log / "depth.csv").write_text(f"time_s,depth_m\n0,{depth_m}\n")
+    with pytest.raises(LogError) as caught:
+        range_changes(LogFolder(log), settings(water={"salinity_psu": psu}))
+    told = f"{said}, where the formula for the speed of sound holds"
+    assert str(caught.value) == f"{log}/{told}"
 
 
 def test_ranges_are_corrected_by_the_water(tmp_path: Path) -> None:
@@ -212,7 +247,7 @@ def test_ranges_are_corrected_by_the_water(tmp_path: Path) -> None:
         replay(LogFolder(tmp_path), trials.settings({}), causes=False).numbers["rmse_m"] > 2 * plain
     )
     write_file(tmp_path, "water.csv", time_s=water_s, temperature_c=temperature - 8)
-    with pytest.raises(ValueError, match=r"water\.csv.*temperature_c must lie in 0\.\.35"):
+    with pytest.raises(ValueError, match=r"water\.csv, line 2, column temperature_c: -4 is outs"):
         replay(LogFolder(tmp_path), trials.settings({}), causes=False)
 
 
@@ -248,3 +283,9 @@ def test_the_page_is_what_was_measured_and_every_aim_is_reached() -> None:
     assert {one.set_name for one in recordings} == set(measure.RECORDINGS)
     assert all(bench.held().values())
     assert page.page(bench) == (PAGE / "README.md").read_text(encoding="utf-8")
+    alone = page.page(Bench(rows, []))
+    assert alone.startswith("# Constants\n\nMade by `auvest reproduce constants`; ")
+    for of_recordings in ("--data", "ecordings", "labyrinth", "hat_charles"):
+        assert of_recordings not in alone
+    assert alone.count("\n| ") == 2 + len(rows)
+    assert alone.endswith(" |\n")

@@ -315,7 +315,9 @@ def test_a_measurement_from_nowhere_is_refused(kind, case):
             call(rows, dt=1.0, input=driven, sensor=["it", "there", "it", "there"], place=where)
     with pytest.raises(ValueError, match=r"^run 0: place\[2\] must be given"):
         f.run(np.stack([rows, rows]), dt=1.0, input=driven, sensor="it", place=where)
-    with pytest.raises(ValueError, match=f"^{type(model).__name__} was made without {model.place}"):
+    kind_of = type(model).__name__
+    needed = rf"{model.place}, which this needs: {kind_of}\({model.place}=\.\.\.\)$"
+    with pytest.raises(ValueError, match=f"^{kind_of} was made without {needed}"):
         model.h(start(process)[0])
     assert everything(f) == before
 
@@ -434,7 +436,9 @@ def test_what_is_older_than_the_window_is_too_late(kind, name, dtype):
     rows[:30].drive(c)
     c.predict(rows.dt[30], None if rows.input is None else rows.input[30])
     before = readable(c)
-    with pytest.raises(FilterError, match=r"age_s = 4\.0 is more than late_s = 3\.0") as caught:
+    with pytest.raises(
+        FilterError, match=r"age_s = 4 is more than late_s = 3: make the filter with a larger"
+    ) as caught:
         rows.update(c, 30)
     assert caught.value.status == Status.time_backwards
     assert readable(c) == before
@@ -448,7 +452,7 @@ def test_an_age_needs_a_window(kind):
     f = make(kind, "SpeedHeading")
     rows[:3].drive(f)
     before = readable(f)
-    with pytest.raises(FilterError, match=r"age_s = 0\.5 is more than late_s = 0\.0"):
+    with pytest.raises(FilterError, match=r"age_s = 0\.5 is more than late_s = 0: make"):
         rows.update(f, 5, age_s=0.5)
     assert readable(f) == before
     with pytest.raises(ValueError, match=r"age_s\[5\] is 0\.5, but late_s of this filter is 0"):
@@ -585,9 +589,9 @@ def test_what_is_not_its_own_state_is_refused():
         assert everything(f) == before
     whole = f.save()
     for k in range(0, len(whole), 7):
-        with pytest.raises(ValueError, match=r"^state is not from|^state is damaged"):
+        with pytest.raises(ValueError, match=r"^state is (cut short|not from|damaged)"):
             f.restore(whole[:k] + bytes([whole[k] ^ 0x10]) + whole[k + 1 :])
-        with pytest.raises(ValueError, match=r"^state is not from|^state is damaged"):
+        with pytest.raises(ValueError, match=r"^state is (cut short|not from|damaged)"):
             f.restore(whole[:k])
     assert everything(f) == before
 
@@ -649,7 +653,7 @@ REFUSALS = {
     "sensor not said": (
         lambda f, r: f.update(first_z(f, r)),
         TypeError,
-        r"sensor must be '\w+' or .*'again'",
+        r"^sensor must be given: the filter has several \('\w+', .*'again'\)$",
     ),
     "sensor of another kind": (
         lambda f, r: f.update(first_z(f, r), f.process),
@@ -729,7 +733,7 @@ REFUSALS = {
     "run sensor not said": (
         lambda f, r: dataclasses.replace(r, sensor=None).run(f),
         TypeError,
-        r"sensor must be '\w+' or .*'again'",
+        r"^sensor must be given: the filter has several \('\w+', .*'again'\)$",
     ),
     "run place": (
         lambda f, r: dataclasses.replace(r, place=np.ones((60, 9))).run(f),
@@ -746,13 +750,17 @@ REFUSALS = {
         TypeError,
         "covariance must be True or",
     ),
-    "restore": (lambda f, _: f.restore(b"auvest"), ValueError, "state is not from save"),
+    "restore": (
+        lambda f, _: f.restore(b"auvest"),
+        ValueError,
+        "^state is cut short: it has 6 bytes",
+    ),
 }
 #: As above, of the core: the status is what it said, and all else as it was.
 FAILURES = {
     "too late": (
         lambda f, r: f.update(first_z(f, r), r.sensor[0], age_s=1e6),
-        r"update: age_s = 1000000\.0 is more than late_s = 2\.0",
+        r"update: age_s = 1e\+06 is more than late_s = 2: make the filter with a larger late_s$",
         Status.time_backwards,
     ),
     "overflow": (overflow, "update: .*not be finite", Status.overflow),
@@ -1074,7 +1082,7 @@ def test_a_range_that_the_sensor_cannot_measure_is_refused_by_name(kind, name, d
         z[0] = -1.0
         with pytest.raises(
             FilterError,
-            match=rf"{sensor} cannot measure a range of -1 m; its ranges are 0 to inf m",
+            match=rf"{sensor} cannot measure a range of -1 m; its ranges are 0 m or more;",
         ) as caught:
             f.update(z, sensor)
         assert caught.value.status == Status.impossible_range

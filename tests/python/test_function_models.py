@@ -530,7 +530,7 @@ CONSTRUCTIONS = {
         ValueError,
         r"angles\[1\] must lie in 0\.\.1, not 2",
     ),
-    "h": (lambda: FunctionSensor(None, 1.0), TypeError, "h must be a function, not NoneType"),
+    "h": (lambda: FunctionSensor(None, 1.0), TypeError, "^h must be a function, not None$"),
     "R zero": (lambda: FunctionSensor(fix, 0.0), ValueError, r"R\[0, 0\] is 0\.0; a variance must"),
     "R skew": (
         lambda: FunctionSensor(fix, [[1.0, 0.5], [0.0, 1.0]]),

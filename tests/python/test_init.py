@@ -12,7 +12,7 @@ from test_check import arc
 from typer.testing import CliRunner
 
 from auvest.cli import app
-from auvest.logs.guess import guess, table_of
+from auvest.logs.guess import _by_size, guess, table_of
 from auvest.logs.layout import FILES, SPELLINGS, WHAT
 from auvest.logs.write import write_file
 from auvest.replay import Settings, read_settings
@@ -186,7 +186,13 @@ def test_the_command_writes_once(tmp_path: Path) -> None:
     assert path.read_text() == "# mine\n"
     assert call("init", tmp_path / "log", "--force", "--quiet").exit_code == 0
     assert path.read_text() != "# mine\n"
-    assert "is not a folder" in call("init", tmp_path / "nowhere").stderr
+    said = call("init", tmp_path / "nowhere").stderr
+    assert said == f"Error: LOG: {tmp_path / 'nowhere'}: there is no such folder\n"
+
+
+def test_a_full_turn_that_was_rounded_is_not_in_degrees() -> None:
+    assert _by_size("heading_rad", [0.0, 6.2832]) == ""
+    assert _by_size("heading_rad", [0.0, 6.2834]) == "deg"
 
 
 def test_the_command_says_what_it_took_for_what_and_what_is_wrong(tmp_path: Path) -> None:

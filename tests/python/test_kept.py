@@ -62,12 +62,14 @@ def test_arguments_and_their_defaults(kept: Kept) -> None:
 
 def test_options_and_their_defaults(kept: Kept) -> None:
     def options(command: Any, name: str) -> Iterator[str]:
-        for one in command.params:
-            yield f"{name} {' '.join(one.opts)} {one.default!r}"
         if hasattr(command, "list_commands"):
             with command.context_class(command) as context:
                 for word in command.list_commands(context):
                     yield from options(command.get_command(context, word), f"{name} {word}")
+        else:
+            with command.make_context(name, [], resilient_parsing=True) as context:
+                for one in context.command.params:
+                    yield f"{name} {' '.join(one.opts)} {one.default!r}"
 
     kept("options.txt", "\n".join(options(get_command(app), "auvest")) + "\n", exact=True)
 

@@ -443,21 +443,31 @@ def test_columns_that_are_not_read_are_a_note(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "header", "column"),
+    ("name", "header", "column", "meant", "unit"),
     [
-        ("odometry.csv", "time_s,forward_m,left_m,turn_deg", "turn_deg"),
-        ("odometry.csv", "time_s,speed_m_s,heading_deg", "heading_deg"),
-        ("leaders.csv", "time_s,source,x_m,y_m,sigma_mm", "sigma_mm"),
-        ("depth.csv", "time_s,depth_ft", "depth_ft"),
+        ("odometry.csv", "time_s,forward_m,left_m,turn_deg", "turn_deg", "turn_rad", "deg"),
+        ("odometry.csv", "time_s,speed_m_s,heading_deg", "heading_deg", "heading_rad", "deg"),
+        ("odometry.csv", "time_s,speed_knots,heading_rad", "speed_knots", "speed_m_s", "kn"),
+        ("leaders.csv", "time_s,source,x_m,y_m,sigma_mm", "sigma_mm", "sigma_m", "mm"),
+        ("depth.csv", "time_s,depth_ft", "depth_ft", "depth_m", "ft"),
+        ("water.csv", "time_s,temperature_deg", "temperature_deg", "temperature_c", ""),
     ],
 )
 def test_a_column_in_another_unit_is_not_left_out_in_silence(
-    tmp_path: Path, name: str, header: str, column: str
+    tmp_path: Path, name: str, header: str, column: str, meant: str, unit: str
 ) -> None:
     (tmp_path / name).write_text(header + "\n")
-    with pytest.raises(LogError, match="its unit is not known here") as caught:
+    with pytest.raises(LogError) as caught:
         reader.CsvTable(tmp_path / name)
     assert caught.value.column == column
+    said = f"{tmp_path / name}, line 1, column {column}: a log has {meant}"
+    if unit:
+        stem = name.removesuffix(".csv")
+        said += (
+            "; auvest init LOG writes the settings that convert it ([columns."
+            f'{stem}] {meant} = "{column}", [units.{stem}] {meant} = "{unit}")'
+        )
+    assert str(caught.value) == said
 
 
 def test_a_craft_must_turn_by_something(tmp_path: Path) -> None:

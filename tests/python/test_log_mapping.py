@@ -357,7 +357,10 @@ def test_settings_that_are_wrong_are_named(document: dict[str, Any], words: str)
          "'x' is not a number"),
         ({"columns": {"odometry": {"speed_m_s": "v"}},
           "units": {"odometry": {"speed_m_s": "m/s"}}}, "time_s,v,yaw_rate_rad_s\n0,1,0\n1,99,0\n",
-         3, "v", r"run\.toml: \[columns\.odometry\] takes the file's numbers in 'm/s'"),
+         3, "v", r": 99 m/s lies outside -50\.\.50 m/s .*; run\.toml: \[units\.odometry\] says 'm"),
+        ({"columns": {"odometry": {"speed_m_s": "v"}},
+          "units": {"odometry": {"speed_m_s": "kn"}}}, "time_s,v,yaw_rate_rad_s\n0,192.4,0\n",
+         2, "v", r": 192\.4 kn = 98\.97\d+ m/s lies outside .*\[units\.odometry\] says 'kn'$"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_in_a_mapped_file_is_named_by_its_own_names(

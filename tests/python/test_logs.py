@@ -46,11 +46,22 @@ HEAD = "time_s,source,range_m\n"
     [
         # truncated
         (HEAD + "1,0,5\n2,0,", 3, None, "truncated"),
-        (HEAD + "1,0,5\n2,0\n", 3, None, "2 cells, expected 3"),
+        (HEAD + "1,0,5\n2,0\n", 3, None, ": 2 cells, expected 3: truncated?"),
         (HEAD + "1,0,5\n2,0,6", 3, None, "line end"),
-        (HEAD + "1,0,5\n\n2,0,6\n", 3, None, "1 cells, expected 3"),
-        (HEAD + "\n1,0,5\n", 2, None, "1 cells, expected 3"),
-        (HEAD + "1,0,5,9\n", 2, None, "4 cells, expected 3"),
+        (HEAD + "1,0,5\n\n2,0,6\n", 3, None, ": 1 cell, expected 3: truncated?"),
+        (HEAD + "\n1,0,5\n", 2, None, ": 1 cell, expected 3: truncated?"),
+        (
+            HEAD + "1,0,5,9\n",
+            2,
+            None,
+            "4 cells, expected 3: a comma within a cell, or decimal commas?",
+        ),
+        (
+            HEAD + "1,0,5,x\n",
+            2,
+            None,
+            "4 cells, expected 3: a comma within a cell, or decimal commas?",
+        ),
         # NaN-ridden
         (HEAD + "1,0,nan\n", 2, "range_m", "leave out the row"),
         (HEAD + "1,0,5\nnan,0,5\n", 3, "time_s", "nan is not a number from"),
@@ -59,29 +70,63 @@ HEAD = "time_s,source,range_m\n"
         (HEAD + "1,0,1_0\n", 2, "range_m", "'1_0' is not a number"),
         (HEAD + "1,0,five\n", 2, "range_m", "'five' is not a number"),
         # wrong units
-        (HEAD + "1,0,5\n1665936896000,0,5\n", 3, "time_s", "milliseconds"),
+        (
+            HEAD + "1,0,5\n1665936896000,0,5\n",
+            3,
+            "time_s",
+            "1.665936896e+12 lies outside -1e+11..1e+11 s (milliseconds?)",
+        ),
+        (
+            HEAD + "1665936896000000,0,5\n",
+            2,
+            "time_s",
+            "1.665936896e+15 lies outside -1e+11..1e+11 s (microseconds?)",
+        ),
+        (
+            HEAD + "1665936896000000000,0,5\n",
+            2,
+            "time_s",
+            "1.665936896e+18 lies outside -1e+11..1e+11 s (nanoseconds?)",
+        ),
+        (HEAD + "-1e12,0,5\n", 2, "time_s", "column time_s: -1e+12 lies outside -1e+11..1e+11 s"),
         (HEAD + "1,0,-1\n", 2, "range_m", "no echo"),
-        (HEAD + "1,0,250000\n", 2, "range_m", "millimetres"),
-        (HEAD + "1,0.5,5\n", 2, "source", "an integer from 0"),
-        ("time_ms,source,range_m\n", 1, "time_ms", "expected time_s"),
-        ("time_s,source,range_km\n", 1, "range_km", "expected range_m"),
+        (
+            HEAD + "1,0,250000\n",
+            2,
+            "range_m",
+            "250000 lies outside 0..100000 m (millimetres, or a code for 'no echo'?)",
+        ),
+        (HEAD + "1,0.5,5\n", 2, "source", "0.5 is not an integer from 0 to 1000000000"),
+        ("time_ms,source,range_m\n", 1, "time_ms", "a log has time_s; auvest init"),
+        ("time_s,source,range_km\n", 1, "range_km", "a log has range_m; auvest init"),
         # not a log at all
-        ("", 1, None, "the header must be time_s,source,range_m"),
+        ("", None, None, "ranges.csv: is empty; its first line must be time_s,source,range_m"),
+        ("\n", 1, None, "the header must be time_s,source,range_m, not blank"),
         ("1,2,3\n", 1, None, "the header must be"),
         ("time_s,source,range_m,range_m\n", 1, None, "the header must be"),
-        (HEAD + '1,0,5\n1,"0"\r,5\n', 3, None, "is no line of cells: new-line character"),
-        ('"time_s"\r,source,range_m\n', 1, None, "is no line of cells: new-line character"),
+        (
+            HEAD + '1,0,5\n1,"0"\r,5\n',
+            3,
+            None,
+            "line 3: has a carriage return within it: lines must end with LF or CRLF",
+        ),
+        (
+            '"time_s"\r,source,range_m\n',
+            1,
+            None,
+            "line 1: has a carriage return within it: lines must end with LF or CRLF",
+        ),
     ],
 )
 def test_refuses_with_file_line_and_column(
-    tmp_path: Path, text: str, line: int, column: str | None, words: str
+    tmp_path: Path, text: str, line: int | None, column: str | None, words: str
 ) -> None:
     path = write(tmp_path, "ranges.csv", text)
     with pytest.raises(LogError) as caught:
         read(path)
     assert (caught.value.path, caught.value.line, caught.value.column) == (path, line, column)
     assert words in str(caught.value)
-    assert str(caught.value).startswith(f"{path}, line {line}")
+    assert str(caught.value).startswith(f"{path}: " if line is None else f"{path}, line {line}")
 
 
 @pytest.mark.parametrize(
@@ -90,16 +135,40 @@ def test_refuses_with_file_line_and_column(
         ("fixes.csv", "time_s,source,range_m,bearing_rad\n1,0,5,90\n", "bearing_rad", "degrees"),
         ("odometry.csv", "time_s,forward_m,left_m,turn_rad\n1,0,0,45\n", "turn_rad", "degrees"),
         ("odometry.csv", "time_s,speed_m_s,yaw_rate_rad_s\n1,1500,0\n", "speed_m_s", "milli"),
-        ("truth.csv", "time_s,x_m,y_m,heading_rad\n1,0,0,180\n", "heading_rad", "degrees"),
+        (
+            "truth.csv",
+            "time_s,x_m,y_m,heading_rad\n1,0,0,180\n",
+            "heading_rad",
+            "180 lies outside -6.283285307..6.283285307 rad (degrees?)",
+        ),
+        (
+            "water.csv",
+            "time_s,temperature_c\n1,283\n",
+            "temperature_c",
+            "283 lies outside -5..60 (kelvin?)",
+        ),
+        (
+            "water.csv",
+            "time_s,temperature_c\n1,-999\n",
+            "temperature_c",
+            "-999 lies outside -5..60 (a code for 'no value'?)",
+        ),
     ],
 )
 def test_suspects_the_unit(
     tmp_path: Path, name: str, text: str, column: str, suspicion: str
 ) -> None:
     path = write(tmp_path, name, text)
-    with pytest.raises(LogError, match=suspicion) as caught:
+    with pytest.raises(LogError, match=re.escape(suspicion)) as caught:
         read(path)
     assert caught.value.column == column
+
+
+def test_a_full_turn_that_was_rounded_is_read(tmp_path: Path) -> None:
+    """6.28319 is 2 pi to five decimals, 6.2832 to four."""
+    text = "time_s,heading_rad\n0,6.28319\n1,-6.2832\n"
+    rows = read(write(tmp_path, "compass.csv", text))
+    np.testing.assert_array_equal(rows[:, 1], [6.28319, -6.2832])
 
 
 @pytest.mark.parametrize("lines", [1, 2, 1000])
@@ -260,7 +329,7 @@ def test_the_limits_of_a_column_are_read_and_nothing_beyond(
         assert read(table(float(limit)))[0, at] == limit
         step = math.copysign(1.0, beyond)
         next_one = limit + step if column.integer else math.nextafter(limit, beyond)
-        with pytest.raises(LogError, match=re.escape(f"is not {column.expected}")) as caught:
+        with pytest.raises(LogError, match=re.escape(f" lies outside {column.span}")) as caught:
             read(table(next_one))
         assert (caught.value.line, caught.value.column) == (2, column.name)
 
@@ -386,7 +455,7 @@ def test_a_folder_must_have_what_a_log_needs(tmp_path: Path, files: str, words: 
 
 def test_a_file_is_not_a_folder(tmp_path: Path) -> None:
     path = write(tmp_path, "ranges.csv", HEAD)
-    with pytest.raises(LogError, match="not a folder"):
+    with pytest.raises(LogError, match=r"ranges\.csv: is a file; a log is a folder of CSV files"):
         LogFolder(path)
 
 

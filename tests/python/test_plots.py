@@ -34,7 +34,7 @@ def test_nees_is_drawn_with_the_bounds_of_so_many_runs() -> None:
     wanted = {*metrics.chi2_bounds(3, 30), *metrics.chi2_bounds(3, 20)}
     assert corners == {round(v, 9) for v in wanted}
     low, high = metrics.chi2_bounds(3, 20)
-    assert f"consistent: {low:.2f} to {high:.2f} (95 %)" in figure.axes[0].get_title(loc="left")
+    assert f"the consistent {low:.2f} to {high:.2f} (95 %)" in figure.axes[0].get_title(loc="left")
 
 
 def test_nis_of_one_run_with_gaps() -> None:
@@ -46,7 +46,7 @@ def test_nis_of_one_run_with_gaps() -> None:
     known = values[np.isfinite(values)]
     low, high = metrics.chi2_bounds(1, known.size, 0.9)
     assert figure.axes[0].get_title(loc="left") == (
-        f"mean of all: {known.mean():.2f}, consistent: {low:.2f} to {high:.2f} (90 %)"
+        f"mean of all: {known.mean():.2f}, within the consistent {low:.2f} to {high:.2f} (90 %)"
     )
     assert figure.axes[0].get_ylabel() == "NIS"
 

@@ -182,8 +182,12 @@ def test_figures_in_words(result: Result) -> None:
         "dead reckoning alone, RMSE": "2.250 m",
         "truth within 3 sigma": "98.8 %",
         "held-out measurements, RMSE": "0.750 m",
-        "NIS, mean, rejected ones too": "1.250 (consistent: 0.500 to 1.750)",
+        "NIS, mean, rejected ones too": "1.250, within the 0.500 to 1.750 of a consistent filter",
     }
+    for nis, where in ((0.25, "below"), (2.0, "above")):
+        told = dict(report.rows(replace(result, numbers={**NUMBERS, "nis_mean": nis})))
+        words = f"{nis:.3f}, {where} the 0.500 to 1.750 of a consistent filter"
+        assert told["NIS, mean, rejected ones too"] == words
     # What is not known has no row.
     unknown = {**NUMBERS, "rmse_m": None, "nis_mean": None, "inside_3_sigma": None}
     known = dict(report.rows(replace(result, numbers=unknown)))

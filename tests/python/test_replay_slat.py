@@ -390,7 +390,7 @@ def test_what_is_written_is_chosen(tmp_path: Path) -> None:
     assert run("--write", "tracks") == {"trajectory.tum", "truth.tum", "results.json"}
     wrong = CliRunner().invoke(app, [*arguments, "--write", "errors,tables"])
     assert wrong.exit_code == 2
-    assert "must be of report, figure, estimates" in wrong.output
+    assert "is not one of report, figure, estimates" in wrong.output
 
 
 def test_thinning_does_not_depend_on_the_parts() -> None:

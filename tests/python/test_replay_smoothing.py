@@ -185,8 +185,11 @@ def test_a_lag_without_a_smoother_is_refused(tmp_path: Path) -> None:
         done = CliRunner().invoke(app, ["replay", str(tmp_path), *options])
         assert done.exit_code == 2, options
         assert "--lag" in done.output
-    for smooth, lag_s in ((False, 5.0), (True, math.nan)):
-        with pytest.raises(ValueError, match="lag_s"):
+    for smooth, lag_s, said in (
+        (False, 5.0, "^lag_s is for smooth=True$"),
+        (True, math.nan, "^lag_s must be finite and not negative, not nan$"),
+    ):
+        with pytest.raises(ValueError, match=said):
             replay(LogFolder(tmp_path), SETTINGS, smooth=smooth, lag_s=lag_s)
 
 

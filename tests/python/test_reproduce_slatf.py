@@ -244,7 +244,7 @@ def test_interrupt_and_failed_runs(
     failed = call(*arguments)
     assert failed.exit_code == 1
     assert json.loads(failed.stdout)["failed_runs"] == 1
-    assert "1 runs failed" in failed.stderr
+    assert "Error: 1 run failed; numbers are missing" in failed.stderr
     small.levels[1]["slatf1"].status[0] = 0
 
     def interrupted(*_: Any) -> None:
@@ -334,7 +334,7 @@ BAD = [
     (["--dropout", "1"], ["--dropout", "1.0 is not a probability"]),
     (["--range-noise", "0"], ["--range-noise", "0.0 is not a finite number above 0"]),
     (["--range-noise", "1e-7"], ["sigma_range_m must be above 1e-6"]),
-    (["--duration", "1"], ["duration_s gives 0 pings"]),
+    (["--duration", "1"], ["duration_s = 1 is too short for one ping: a ping comes every 2 s"]),
     (["--lanes", "avx2"], ["lanes 'avx2' do not run here in float64"]),
     (
         ["--filter", "ekf-slat", "--particles", "10"],

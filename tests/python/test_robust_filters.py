@@ -295,7 +295,7 @@ CALLS = {
     "run position": (
         lambda f: f.run(np.ones(2), dt=1.0, input=np.tile(MOTION, (2, 1)), place=[[1, 2]]),
         ValueError,
-        "place has 1 rows and z has 2",
+        "^place has 1 row and z has 2; they must have the same$",
     ),
     "state": (lambda f: f.restore(b"?"), ValueError, "state is not from save"),
 }

@@ -380,5 +380,8 @@ def test_the_window_reaches_back_all_of_late_s_whatever_the_steps(kind):
     late.update([4.0, -0.8], age_s=1.9)
     assert same_bits(late.x, in_time.x)
     assert same_bits(late.P, in_time.P)
-    with pytest.raises(auvest.FilterError, match=r"age_s = 2\.1 is more than late_s = 2\.0"):
+    with pytest.raises(
+        auvest.FilterError,
+        match=r"age_s = 2\.1 is more than late_s = 2: make the filter with a larger late_s$",
+    ):
         other.update([4.0, -0.8], age_s=2.1)

@@ -177,7 +177,11 @@ def test_what_a_simulation_cannot_take_is_refused():
     with pytest.raises(ValueError, match="filter must have a SpeedHeading of two states"):
         simulate(f)
     f = auvest.Ekf([0, 0], np.eye(2), process=auvest.SpeedHeading())
-    with pytest.raises(ValueError, match="filter must have one LeaderRange as its sensor, not "):
+    with pytest.raises(ValueError, match=r"one LeaderRange as its only sensor; it has none$"):
+        simulate(f)
+    several = {"a": auvest.Position(), "b": auvest.LeaderRange()}
+    f = auvest.Ekf([0, 0], np.eye(2), process=auvest.SpeedHeading(), sensors=several)
+    with pytest.raises(ValueError, match=r"only sensor; it has Position, LeaderRange$"):
         simulate(f)
     with pytest.raises(TypeError, match=r"filter must be an auvest\.Ekf or auvest\.Ukf, not Slatf"):
         simulate(auvest.Slatf([0, 0], np.eye(2)))

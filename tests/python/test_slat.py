@@ -681,7 +681,7 @@ def test_what_is_no_number_is_not_taken_for_one() -> None:
     bad: list[tuple[Callable[[], object], str]] = [
         (lambda: filter_.predict(True, [5, 0]), "dt must be a number, not bool"),
         (lambda: filter_.predict("1", [5, 0]), "dt must be a number, not str"),  # type: ignore[arg-type]
-        (lambda: filter_.predict(10**400, [5, 0]), "dt must be finite"),
+        (lambda: filter_.predict(10**400, [5, 0]), "^dt is beyond the range of float64$"),
         (lambda: filter_.predict(1, [5, None]), "u must be an array"),  # type: ignore[list-item]
         (lambda: filter_.predict(1, [5, 10**400]), "u must be an array"),
         (lambda: filter_.predict(1, masked), "u must be .* not a masked array"),

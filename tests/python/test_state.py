@@ -164,7 +164,13 @@ def test_a_remembered_measurement_of_a_sensor_that_does_not_fit_is_refused():
 
 FOREIGN = {
     "not bytes": (lambda: [1, 2], TypeError, "state must be bytes from save"),
-    "empty": (lambda: b"", ValueError, "state is not from save"),
+    "empty": (lambda: b"", ValueError, "^state is cut short: it has 0 bytes, a state at least 28$"),
+    "cut": (lambda: b"auvest\r\n", ValueError, "^state is cut short: it has 8 bytes, a state at"),
+    "text": (
+        lambda: b"a" * 30,
+        ValueError,
+        "^state is not from save.*begins with b'aaaaaaaa', exp",
+    ),
     "class": (lambda: make(auvest.Ekf, "float32").save(), ValueError, "class Ekf, expected Ukf"),
     "precision": (
         lambda: make(auvest.Ukf).save(),

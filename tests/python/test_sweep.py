@@ -270,7 +270,7 @@ def test_a_task_that_fails_ends_the_sweep_and_keeps_the_rest(
         return Failure("no memory") if task.key == plan.tasks[5].key else attempt(task)
 
     monkeypatch.setattr(processes, "attempt", failing)
-    with pytest.raises(auvest.SweepError, match=r"runs 40 to 49 of \{.*\}: no memory"):
+    with pytest.raises(auvest.SweepError, match=r"^runs 40 to 49 of \w[\w.]* = [^{}']+: no memory"):
         sweeps.serially(SMALL, tmp_path)
     monkeypatch.undo()
     assert sweeps.serially(SMALL, tmp_path).computed == 12 - 5
@@ -320,8 +320,11 @@ def _pretend(what: str) -> None:
 @pytest.mark.parametrize(
     ("pretend", "why"),
     [
-        ("version", "auvest 0.0.9"),
-        ("arithmetic", f"auvest {auvest.__version__}, whose self-test fails: exp: 3 of 10 wrong"),
+        ("version", "has auvest 0.0.9"),
+        (
+            "arithmetic",
+            f"has auvest {auvest.__version__}, but its self-test fails (exp: 3 of 10 wrong)",
+        ),
     ],
 )
 def test_a_worker_that_may_not_compute_gets_no_task(
@@ -339,12 +342,15 @@ def test_a_worker_that_may_not_compute_gets_no_task(
     result = auvest.sweep(SMALL, executor=executor)
     assert result.digest() == digest
     assert list(executor.refused) == workers[:1]
-    assert executor.refused[workers[0]].startswith(why)
-    assert len(said) == 1
-    assert said[0].startswith(f"worker {workers[0]} is refused: it has {why}")
+    assert executor.refused[workers[0]] == why
+    needed = f"auvest {auvest.__version__} is needed"
+    assert said == [f"worker {workers[0]} is refused: it {why}; {needed}"]
     monkeypatch.setattr(dask, "_PATIENCE_REFUSED_S", 0.0)
     client.run(_pretend, pretend, workers=workers[1:])
-    with pytest.raises(auvest.SweepError, match=r"has no worker with auvest .*; tcp://.* has auve"):
+    message = (
+        rf"^no worker of the cluster can be used; {re.escape(needed)}: tcp:\S+ {re.escape(why)}; "
+    )
+    with pytest.raises(auvest.SweepError, match=message):
         auvest.sweep(SMALL, executor=dask.Dask(client, warn=said.append))
     client.run(_pretend, "nothing")
 

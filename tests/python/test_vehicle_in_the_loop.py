@@ -275,7 +275,7 @@ def test_a_command_that_is_wrong_by_a_bit_is_told(
     code, document, error = call(Wrong, "--duration", "5", "--no-figure")
     assert code == 1
     assert document["results"]["differing_commands"] == 1
-    assert "1 commands of the chip are not those of its pilot here" in error
+    assert "1 command of the chip is not that of its pilot here" in error
 
 
 def test_a_board_that_falls_silent_keeps_its_samples(

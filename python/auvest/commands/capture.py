@@ -34,6 +34,7 @@ import typer
 from rich.table import Table
 
 from auvest import MahalanobisInterval, RangeBearing, metrics, telemetry
+from auvest._texts import NIS_OFF, counted, os_reason, then
 from auvest.board import Board, BoardError, Finished, PinChange, SerialLine
 from auvest.commands import options
 from auvest.commands.console import Terminal, table
@@ -427,7 +428,7 @@ def command(
         session.draw(_figure, recording, sensor, source)
     session.report(values, _table(values, source))
     kept = f"{values['samples']} of {steps} samples are kept"
-    lost = f"{session.trouble}; the samples until then are kept" if session.trouble else ""
+    lost = then(session.trouble, "the samples until then are kept") if session.trouble else ""
     session.end(kept, lost)
 
 
@@ -503,7 +504,7 @@ def _listen(port: str, baud: int, recording: Recording, wanted: Callable[[], boo
                         f"that names its columns, at {baud} baud? {recording.trouble}".rstrip()
                     )
     except (serial.SerialException, OSError) as error:
-        raise _ConnectionLost(f"{port}: {error}") from None
+        raise _ConnectionLost(f"{port}: {os_reason(error)}") from None
 
 
 def measures(recording: Recording, *, simulated: bool) -> dict[str, Any]:
@@ -542,7 +543,7 @@ def _count(values: Floats) -> int | float:
 def _figure(recording: Recording, sensor: RangeBearing, source: str) -> Figure:
     from auvest import plots  # here, because matplotlib takes long to import
 
-    title = f"{Path(source).name}: {len(recording.rows)} samples"
+    title = f"{Path(source).name}: {counted(len(recording.rows), 'sample')}"
     if not {"x_m", "y_m", "nis", "interval_s", "range_m"} <= set(recording.rows[0]):
         drawn = [name for name in recording.rows[0] if name not in ("section", "sample", "time_s")]
         return plots.columns_figure(
@@ -581,7 +582,7 @@ def _table(values: dict[str, Any], source: str) -> Table:
     if math.isfinite(values["mean_interval_s"]):
         rows.append(("mean interval / s", f"{values['mean_interval_s']:.4f}", ""))
     if math.isfinite(values["nis_mean"]):
-        rows.append(("NIS, mean", f"{values['nis_mean']:.3f}", "expected 2; below: cautious"))
+        rows.append(("NIS, mean", f"{values['nis_mean']:.3f}", f"expected 2; {NIS_OFF}"))
     if math.isfinite(values["awake_share_simulated"]):
         share = 100 * values["awake_share_simulated"]
         rows.append(("time awake", f"{share:.2f} %", "counted by the simulator"))
@@ -593,5 +594,5 @@ def _table(values: dict[str, Any], source: str) -> Table:
         rows.append(("worst timing error / ms", f"{error:.3f}", "trigger against commanded moment"))
     if math.isfinite(values["rmse_m"]):
         rows.append(("position RMSE / m", f"{values['rmse_m']:.4f}", "against the simulated truth"))
-    title = f"{source}: {values['samples']} samples in {values['duration_s']:.1f} s"
+    title = f"{source}: {counted(values['samples'], 'sample')} in {values['duration_s']:.1f} s"
     return table(title, ("quantity", "value", "note"), rows, right={1})

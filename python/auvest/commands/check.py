@@ -21,13 +21,17 @@ Examples
 
 from __future__ import annotations
 
+import math
+
 from rich.table import Table
 
+from auvest._texts import short
 from auvest.commands import log_options, options
 from auvest.commands.console import Terminal, table
 from auvest.commands.version import version
 from auvest.logs.check import FileSeen, SourceSeen
 from auvest.logs.findings import worst
+from auvest.logs.reader import not_a_folder
 from auvest.replay.checks import Checked, check
 
 
@@ -48,7 +52,7 @@ def command(
         settings = log_options.settings_of(config, changes)
         for path in logs:
             if not path.is_dir():
-                raise ValueError(f"LOG: {path} is not a folder (see --layout)")
+                raise ValueError(f"LOG: {path}: {not_a_folder(path)}")
         checked = [check(path, settings, filter_name) for path in logs]
     terminal.result_json(
         {
@@ -84,7 +88,7 @@ def _files(one: Checked) -> Table:
             name,
             f"{seen.lines}",
             f"{seen.first_s:.10g} to {seen.last_s:.10g}" if seen.lines else "",
-            f"{seen.usual_step_s:.3g}" if seen.lines > 1 else "",
+            short(seen.usual_step_s) if seen.lines > 1 else "",
             _longest(seen),
         )
         for name, seen in one.files.items()
@@ -94,7 +98,7 @@ def _files(one: Checked) -> Table:
 
 
 def _longest(seen: FileSeen) -> str:
-    return f"{seen.long[0].length_s:.3g} (line {seen.long[0].line})" if seen.long else ""
+    return f"{short(seen.long[0].length_s)} (line {seen.long[0].line})" if seen.long else ""
 
 
 def _sources(one: Checked) -> Table:
@@ -106,11 +110,11 @@ def _sources(one: Checked) -> Table:
         (
             f"{source.source}",
             f"{source.measurements}",
-            f"{seen[source.source].low_m:.4g} to {seen[source.source].high_m:.4g}",
-            f"{source.median_m:+.2f}",
-            f"{source.spread_m:.2f}",
+            f"{short(seen[source.source].low_m, 4)} to {short(seen[source.source].high_m, 4)}",
+            f"{source.median_m:+.2f}" if math.isfinite(source.median_m) else "",
+            f"{source.spread_m:.2f}" if math.isfinite(source.spread_m) else "",
             f"{100 * source.beyond_share:.0f}",
-            f"{100 * source.trend:+.2f}",
+            f"{100 * source.trend:+.2f}" if math.isfinite(source.trend) else "",
         )
         for source in one.health.sources
     ]

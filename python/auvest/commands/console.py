@@ -144,10 +144,11 @@ class Terminal:
         except OutputError as error:
             self.fail(f"--output: {error}", ExitCode.USAGE)
         except OSError as error:
-            self.fail(
-                f"--output {folder}: cannot write there: {error.strerror or error}",
-                ExitCode.FAILED,
-            )
+            file = next((one for one in folder.parents if one.exists() and not one.is_dir()), None)
+            why = f"cannot write there: {error.strerror or error}"
+            if file is not None:
+                why = f"{file} is a file, not a folder"
+            self.fail(f"--output {folder}: {why}", ExitCode.FAILED)
         _being_made.append(new)
         return new
 
@@ -189,7 +190,7 @@ def table(
     """Make a table; ``right`` are the columns that are flush right."""
     made = Table(title=Text(shown(title)), title_justify="left", title_style="bold")
     for number, name in enumerate(header):
-        made.add_column(name, justify="right" if number in right else "left")
+        made.add_column(name, justify="right" if number in right else "left", overflow="fold")
     for row in rows:
         made.add_row(*map(Text, row))
     return made

@@ -25,6 +25,7 @@ from auvest.commands import log_options, options
 from auvest.commands.console import Terminal, shown
 from auvest.commands.files import write_text
 from auvest.commands.version import version
+from auvest.logs.reader import not_a_folder
 from auvest.replay.first import first_settings
 from auvest.replay.schema import SCHEMA
 
@@ -47,8 +48,10 @@ def command(
         print(SCHEMA.read_text(encoding="utf-8"), end="")
         return
     with terminal.usage_errors():
-        if log is None or not log.is_dir():
-            raise ValueError(f"LOG: {log} is not a folder (see --layout)")
+        if log is None:
+            raise ValueError("LOG: a folder is missing (see --layout)")
+        if not log.is_dir():
+            raise ValueError(f"LOG: {log}: {not_a_folder(log)}")
         path = log / "auvest.toml"
         if path.exists() and not force:
             raise ValueError(f"{path} is there already; --force replaces it")

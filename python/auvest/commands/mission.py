@@ -36,6 +36,7 @@ import typer
 from rich.table import Table
 
 from auvest import montecarlo
+from auvest._texts import counted, os_reason, then
 from auvest.board import BoardError
 from auvest.commands import options
 from auvest.commands.console import Terminal, table
@@ -170,9 +171,12 @@ def command(
         rest = f"{done} of {runs} runs are done and kept; the same command goes on from there"
     elif kept is not None:
         montecarlo.discard(kept.folder)
-    lost = f"{session.trouble}; {rest}" if session.trouble else ""
+    lost = then(session.trouble, rest) if session.trouble else ""
     differing = values["differing_commands"]
-    wrong = f"{differing} commands of the chip are not those of its pilot here" if differing else ""
+    wrong = ""
+    if differing:
+        are = "is not that" if differing == 1 else "are not those"
+        wrong = f"{counted(differing, 'command')} of the chip {are} of its pilot here"
     session.end(rest, lost, wrong)
 
 
@@ -253,7 +257,7 @@ def _fly_port(
                         f"{baud} baud? {chip.last_damage}".rstrip()
                     )
     except (serial.SerialException, OSError) as error:
-        raise _ConnectionLost(f"{port}: {error}") from None
+        raise _ConnectionLost(f"{port}: {os_reason(error)}") from None
     finally:
         chip.vehicle.finish()
 
@@ -457,8 +461,8 @@ def _table(values: dict[str, Any], source: str) -> Table:
     if simulated:
         rows.insert(10, ("deepest stack / B", f"{values['stack_bytes']}", ""))
     title = (
-        f"{source}: {values['finished_runs']} of {values['runs']} runs to the end, "
-        f"{values['samples']} samples"
+        f"{source}: {values['finished_runs']} of {counted(values['runs'], 'run')} to the end, "
+        f"{counted(values['samples'], 'sample')}"
     )
     return table(title, ("quantity", "value", "note"), rows, right={1})
 

@@ -90,8 +90,10 @@ def command(
     terminal = Terminal(as_json=as_json, quiet=quiet)
     log_options.require_smooth(smooth=smooth, lag_s=lag_s)
     wanted = [word.strip() for word in write.split(",")]
-    if not {*wanted} <= {*WRITTEN}:
-        raise typer.BadParameter(f"must be of {', '.join(WRITTEN)}.", param_hint="'--write'")
+    for word in wanted:
+        if word not in WRITTEN:
+            message = f"{word!r} is not one of {', '.join(WRITTEN)}."
+            raise typer.BadParameter(message, param_hint="'--write'")
     formats = FORMATS if kind == "both" else (kind,)
     log_options.note_unread_settings(terminal, config, logs)
     with terminal.usage_errors():

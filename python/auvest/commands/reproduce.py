@@ -14,6 +14,7 @@ from typing import Any
 
 from rich.table import Table
 
+from auvest._texts import counted
 from auvest.commands import console, options
 from auvest.commands.console import Terminal
 from auvest.commands.exit_codes import ExitCode
@@ -102,7 +103,7 @@ def command(
         terminal.result(f"results   {console.shown(output / 'results.json')}")
         failed = getattr(result, "failed_runs", 0)
         if failed:
-            terminal.fail(f"{failed} runs failed; numbers are missing", ExitCode.FAILED)
+            terminal.fail(f"{counted(failed, 'run')} failed; numbers are missing", ExitCode.FAILED)
 
     return with_options(run, measure.measure, Path(f"auvest-output/reproduce-{name}"), annotations)
 

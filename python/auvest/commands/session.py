@@ -11,6 +11,7 @@ import numpy.typing as npt
 from rich.table import Table
 
 from auvest import Status
+from auvest._texts import counted
 from auvest.commands.console import Terminal
 from auvest.commands.exit_codes import ExitCode
 from auvest.commands.files import write_csv, write_results
@@ -134,10 +135,12 @@ def failure(result: Any, of: str = "") -> str:
     if not failed.size:
         return ""
     first = int(failed[0])
-    steps = f", after {int(result.samples[first])} steps" if hasattr(result, "samples") else ""
+    steps = ""
+    if hasattr(result, "samples"):
+        steps = f", after {counted(int(result.samples[first]), 'step')}"
     return (
-        f"{failed.size} of {len(result.status)} runs{of} failed; the first, run {first}{steps}: "
-        f"{Status(int(result.status[first])).name}"
+        f"{failed.size} of {counted(len(result.status), 'run')}{of} failed; the first, run "
+        f"{first}{steps}: {Status(int(result.status[first])).name}"
     )
 
 

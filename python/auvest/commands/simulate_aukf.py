@@ -26,6 +26,7 @@ import typer
 from rich.table import Table
 
 from auvest import CovarianceBudget, FixedInterval, MahalanobisInterval, RangeBearing, metrics
+from auvest._texts import NIS_OFF, counted
 from auvest.commands import options
 from auvest.commands.console import Terminal, table
 from auvest.commands.options import (
@@ -355,7 +356,7 @@ def _table(values: dict[str, Any], settings: dict[str, Any]) -> Table:
          f"{values['samples_per_second']:.3g} samples per second"),
         ("samples", f"{values['samples']}", "of all runs"),
         ("NIS, mean", f"{values['nis_mean']:.3f}",
-         f"consistent: {low:.3f} to {high:.3f} (95 %, chi-square); below: cautious"),
+         f"consistent: {low:.3f} to {high:.3f} (95 %, chi-square); {NIS_OFF}"),
         ("NEES of position, mean", f"{values['nees_mean']:.3f}",
          f"expected 2; {100 * values['nees_steps_inside']:.0f} % of steps within "
          f"{nees_low:.2f} to {nees_high:.2f}"),
@@ -363,7 +364,7 @@ def _table(values: dict[str, Any], settings: dict[str, Any]) -> Table:
     )  # fmt: skip
     title = (
         f"{settings['filter'].upper()}, {settings['interval']['policy']}: "
-        f"{values['runs']} runs of {settings['steps']} steps, {noise['kind']} noise "
+        f"{counted(values['runs'], 'run')} of {settings['steps']} steps, {noise['kind']} noise "
         f"({noise['range_m']:g} m, {noise['bearing_rad']:g} rad{bias}), "
         f"track {settings['track']}, seed {settings['seed']}, {settings['dtype']}"
     )

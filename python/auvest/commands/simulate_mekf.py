@@ -26,6 +26,7 @@ import numpy as np
 from rich.table import Table
 
 from auvest import RejectionStreak, metrics
+from auvest._texts import counted
 from auvest.commands import options
 from auvest.commands.console import Terminal, table
 from auvest.commands.options import FILTER, MONTE_CARLO, WORLD, finite, fraction, option, positive
@@ -230,6 +231,7 @@ def _table(values: dict[str, Any], settings: dict[str, Any]) -> Table:
     scenario = settings["scenario"]
     noise = scenario["noise"]
     shown = {name: values[name] for name in ("plain", "robust") if name in values}
+    nis = "NIS, mean, rejected ones too (1 expected without outliers)"
     cells: dict[str, Callable[[dict[str, Any]], str]] = {
         "position RMSE / m": lambda v: f"{v['rmse_m']:.3f} ± {v['rmse_standard_error_m']:.1g}",
         "ranges taken": lambda v: f"{v['ranges_taken']}",
@@ -239,15 +241,16 @@ def _table(values: dict[str, Any], settings: dict[str, Any]) -> Table:
         "older than the memory": lambda v: f"{v['too_late']}",
         "lost in the water": lambda v: f"{v['lost']}",
         "too many in flight": lambda v: f"{v['overflowed']}",
-        "NIS, mean (1 expected)": lambda v: f"{v.get('nis_mean', np.nan):.3f}",
+        nis: lambda v: f"{v.get('nis_mean', np.nan):.3f}",
         "NEES, mean (2 expected)": lambda v: f"{v['nees_mean']:.3f}",
     }
     rows = [(name, *(cell(v) for v in shown.values())) for name, cell in cells.items()]
     if "improvement" in values:
         rows.append(("improvement", "", f"{100 * values['improvement']:.1f} %"))
     title = (
-        f"{settings['filter'].upper()} and {settings['kernel']['name']}: {scenario['runs']} "
-        f"runs of {scenario['steps']} s, {noise['kind']} noise, timing {scenario['timing']}, "
-        f"seed {scenario['seed']}, {settings['dtype']}"
+        f"{settings['filter'].upper()} and {settings['kernel']['name']}: "
+        f"{counted(scenario['runs'], 'run')} of {scenario['steps']} s, "
+        f"{noise['kind']} noise, timing {scenario['timing']}, seed {scenario['seed']}, "
+        f"{settings['dtype']}"
     )
     return table(title, ("quantity", *shown), rows, right={1, 2})

@@ -26,6 +26,7 @@ import numpy as np
 from rich.table import Table
 
 from auvest import CovarianceBudget, FixedInterval, MahalanobisInterval, RejectionStreak
+from auvest._texts import counted
 from auvest.commands import options
 from auvest.commands.console import Terminal, table
 from auvest.commands.options import FILTER, WORLD, option, positive
@@ -264,19 +265,27 @@ def _table(values: dict[str, Any], plan: Mission) -> Table:
     smooth = plan.track == "circle" or plan.path != "waypoints"
     since = "after 60 s" if smooth else "from 50 m into a leg"
     everything = "from the start" if smooth else "corners too"
+    nis, outliers, kernel = "NIS, mean (2 expected)", "", ""
+    if plan.kernel is not None:
+        nis = "NIS, mean, rejected ones too (2 expected)"
+        kernel = f", kernel {type(plan.kernel).__name__.lower()}"
+    if plan.usbl_outliers > 0:
+        nis = nis.replace("expected", "expected without outliers")
+        outliers = f", {100 * plan.usbl_outliers:g} % outliers"
     rows = [
         (f"cross-track RMS, settled ({since})", *with_error("settled_rms_m", "m")),
         (f"cross-track RMS, {everything}", *with_error("all_rms_m", "m")),
         ("position error of the estimate, RMS", *with_error("position_rms_m", "m")),
         ("mean interval of fixes", *with_error("mean_interval_s", "s")),
         ("rudder travel", f"{values['rudder_travel_deg_s']:.1f}", "deg/s"),
-        ("NIS, mean (2 expected)", f"{values['nis_mean']:.2f}", ""),
+        (nis, f"{values['nis_mean']:.2f}", ""),
         ("NEES of the position, mean (2 expected)", f"{values['nees_position_mean']:.2f}", ""),
         ("NEES of four states, mean (4 expected)", f"{values['nees_mean']:.2f}", ""),
     ]
     title = (
-        f"{_track(plan)}, {plan.estimate}, {plan.guidance}: {values['runs']} runs, "
-        f"{plan.degrees_of_freedom} degrees of freedom, current {plan.current_m_s:g} m/s, "
+        f"{_track(plan)}, {plan.estimate}, {plan.guidance}: {counted(values['runs'], 'run')}, "
+        f"{plan.degrees_of_freedom} degrees of freedom, current {plan.current_m_s:g} m/s"
+        f"{outliers}{kernel}, "
         f"seed {plan.seed}, {plan.dtype}"
     )
     return table(title, ("quantity", "value", "unit"), rows, right={1})

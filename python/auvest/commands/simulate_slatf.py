@@ -30,6 +30,7 @@ import typer
 from rich.table import Table
 
 from auvest import metrics, montecarlo
+from auvest._texts import counted
 from auvest.commands import console, options
 from auvest.commands.console import Terminal
 from auvest.commands.options import (
@@ -274,14 +275,14 @@ def _table(values: dict[str, Any], scenario: SlatScenario, title: str) -> Table:
         "rms error at the end / m": f"{values['end_error_m']:.2f}",
         "RMSE of the masters / m": f"{values['master_rmse_m']:.2f}",
         "mean NEES (2 expected)": f"{values['nees_mean']:.2f}",
-        "truth in the 95 % ellipse": f"{values['covered_95']:.0%}",
+        "truth in the 95 % ellipse": f"{100 * values['covered_95']:.0f} %",
         "resamplings per run": f"{values['resamplings_per_run']:.1f}",
         "echoes per run": f"{values['echoes_per_run']:.1f}",
         "failed runs": f"{values['failed_runs']}",
     }
     text = (
-        f"{title}: {values['runs']} runs of {scenario.duration_s:g} s, sonar "
+        f"{title}: {counted(values['runs'], 'run')} of {scenario.duration_s:g} s, sonar "
         f"{scenario.sigma_range_m:g} m, {scenario.sigma_bearing_rad:g} rad, "
-        f"{len(scenario.masters)} master(s), seed {scenario.seed}"
+        f"{counted(len(scenario.masters), 'master')}, seed {scenario.seed}"
     )
     return console.table(text, ("measure", "value"), rows.items(), right={1})

@@ -25,6 +25,7 @@ from rich.table import Table
 
 from auvest import montecarlo
 from auvest._outputs import OutputError
+from auvest._texts import counted
 from auvest.commands import options
 from auvest.commands.console import Terminal, table
 from auvest.commands.exit_codes import ExitCode
@@ -194,8 +195,9 @@ def _table(result: SweepResult) -> Table:
                 value += f" ± {error[number]:.2g}"
         rows.append((*cells, str(line["runs"]), str(line["failed_runs"]), value))
     more = len(plan.points) - len(rows)
-    title = f"{plan.scenario}: {len(plan.points)} points of {plan.runs} runs, seed {plan.seed}" + (
-        f"; the first {len(rows)}, the rest is in table.csv" if more else ""
+    title = (
+        f"{plan.scenario}: {counted(len(plan.points), 'point')} of {counted(plan.runs, 'run')}, "
+        f"seed {plan.seed}" + (f"; the first {len(rows)}, the rest is in table.csv" if more else "")
     )
     names = (*axes, "runs", "failed", result.measure)
     return table(title, names, rows, right=range(len(axes), len(names)))

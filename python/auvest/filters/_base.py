@@ -34,11 +34,14 @@ from auvest._arguments import (
     far_from_origin,
     impossible_range,
     require_range,
+    step_too_long,
+    type_name,
     warn_of_degrees,
 )
 from auvest._core import Convergence, Decision, Status
 from auvest._interrupts import first_slice, in_slices
 from auvest._state import describe, pack, require, unpack
+from auvest._texts import counted
 from auvest.errors import FilterError, Interrupted
 from auvest.filters._many import is_stack, run_many
 from auvest.filters.results import Mixture, Report, RunResult, SmoothResult
@@ -472,12 +475,12 @@ class GaussianFilter:
             age = 0.0 if age_s is None else as_number("age_s", age_s, "not negative")
             code = self._filter.update(row, handle, there, age)
         if code == int(Status.time_backwards):
-            raise FilterError(
-                "update",
-                Status.time_backwards,
-                hint=f"age_s = {age_s} is more than late_s = {self.late_s} or than the filter "
-                "has run",
-            )
+            age = as_number("age_s", age_s)
+            why = "reaches back before the start: the filter has run for less than that"
+            if age > self.late_s:
+                more = "make the filter with a larger late_s"
+                why = f"is more than late_s = {self.late_s:g}: {more}"
+            raise FilterError("update", Status.time_backwards, hint=f"age_s = {age:g} {why}")
         self._require_done("update", code, z=z, sensor=sensor, place=place)
 
     def feedback(self, reference: npt.ArrayLike | None = None) -> float:
@@ -1027,8 +1030,10 @@ class GaussianFilter:
         if sensor is None:
             if self._only is not None:
                 return self._only
-            what = _named(self._sensors) if self._sensors else "a model: this filter has none"
-            raise TypeError(f"sensor must be {what}")
+            if not self._sensors:
+                raise TypeError("sensor must be a model: this filter has none")
+            several = ", ".join(map(repr, self._sensors))
+            raise TypeError(f"sensor must be given: the filter has several ({several})")
         model: MeasurementModel = as_instance("sensor", sensor, MeasurementModel)
         model.check_process(self._process)
         self._require_jacobian(model)
@@ -1205,10 +1210,7 @@ class GaussianFilter:
         """Explain a status that says less than is known here; empty for the others."""
         if status == Status.step_too_long:
             step = "the interval of the policy" if dt is None else f"dt = {float(dt):.6g} s"
-            return (
-                f"{step} is longer than longest_step_s = {self.longest_step_s:g} s: did the clock "
-                "jump, or is it in another unit?"
-            )
+            return step_too_long(step, self.longest_step_s)
         if status == Status.impossible_range:
             name, model = self._named_sensor(sensor)
             return impossible_range(name, float(np.ravel(np.asarray(z))[0]), model)
@@ -1291,7 +1293,7 @@ def _as_sensors(sensors: Sensors, process: ProcessModel) -> dict[str, Measuremen
         named = dict(sensors)
         for name in named:
             if not isinstance(name, str):
-                raise TypeError(f"the names of sensors must be str, not {type(name).__name__}")
+                raise TypeError(f"the names of sensors must be str, not {type_name(name)}")
     elif isinstance(sensors, Sequence) and not isinstance(sensors, str):
         named = {}
         for model in sensors:
@@ -1304,7 +1306,7 @@ def _as_sensors(sensors: Sensors, process: ProcessModel) -> dict[str, Measuremen
     else:
         raise TypeError(
             "sensors must be a measurement model, a sequence of them or a dict of them by name, "
-            f"not {type(sensors).__name__}"
+            f"not {type_name(sensors)}"
         )
     for name, model in named.items():
         as_instance(f"sensors[{name!r}]", model, MeasurementModel)
@@ -1328,4 +1330,6 @@ def _require_rows(name: str, array: Floats, rows: int) -> None:
 
 
 def _refuse_rows(name: str, have: int, rows: int, other: str = "z") -> NoReturn:
-    raise ValueError(f"{name} has {have} rows and {other} has {rows}; they must have the same")
+    raise ValueError(
+        f"{name} has {counted(have, 'row')} and {other} has {rows}; they must have the same"
+    )

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from auvest import _core, montecarlo
 from auvest._arguments import as_real
 from auvest._core import Status
+from auvest._texts import counted
 from auvest.errors import FilterError, Interrupted
 from auvest.filters.results import RunResult, RunsResult
 
@@ -61,7 +62,8 @@ def run_many(
     handles = [filter._handle(one) for one in used]
     if which is not None and len(which) != rows:
         raise ValueError(
-            f"sensor has {len(which)} rows and each run of z has {rows}; they must have the same"
+            f"sensor has {counted(len(which), 'row')} and each run of z has {rows}; they "
+            "must have the same"
         )
     own = {name for name in given if _is_per_run(name, given[name], axes[name], runs)}
 
@@ -133,7 +135,9 @@ def _is_per_run(name: str, value: Any, axes: int, runs: int) -> bool:
     if value is None or _axes(value) != axes + 1:
         return False
     if len(value) != runs:
-        raise ValueError(f"{name} has {len(value)} runs and z has {runs}; they must have the same")
+        raise ValueError(
+            f"{name} has {counted(len(value), 'run')} and z has {runs}; they must have the same"
+        )
     return True
 
 

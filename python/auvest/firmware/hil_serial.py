@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable
 from typing import Protocol
 
+from auvest._texts import os_reason
 from auvest.firmware.hil_bench import ANEW, Bench, answer_of, row_frame
 from auvest.telemetry import LineError
 
@@ -49,7 +50,7 @@ class _Port:
         try:
             self._port = serial.Serial(name, BAUD, timeout=0.1)
         except self._failure as error:
-            raise LineLost(str(error)) from None
+            raise LineLost(f"{name}: {os_reason(error)}") from None
 
     def __enter__(self) -> _Port:
         return self

@@ -10,7 +10,9 @@ from collections.abc import Container, Iterator
 from pathlib import Path
 from typing import ClassVar
 
+from auvest._texts import other_cells
 from auvest.importers.recording import Message, Recording, nanoseconds, text_lines, value_of
+from auvest.logs.reader import CARRIAGE_RETURN
 
 #: Columns that hold the time in seconds, the first of them that a table has.
 _TIMES = ("timestamp", "timestamp_abs", "time_s", "t")
@@ -44,14 +46,15 @@ class CsvTableRecording(Recording):
             try:
                 (cells,) = csv.reader([line], strict=True)
             except (csv.Error, ValueError) as error:
-                raise self.error(where, f"is no row of cells: {error}") from None
+                why = CARRIAGE_RETURN if "\r" in line else f"is no row of cells: {error}"
+                raise self.error(where, why) from None
             if not names:
                 names = self._header([cell.strip() for cell in cells])
                 topic = _topic(set(names))
                 clock = next((names.index(time) for time in _TIMES if time in names), None)
                 continue
             if len(cells) != len(names):
-                raise self.error(where, f"{len(cells)} cells, expected {len(names)}: truncated?")
+                raise self.error(where, other_cells(len(cells), len(names)))
             rows += 1
             if rows == 1 and clock is not None and _other_unit(cells[clock]):
                 clock = None  # a mapping says which

@@ -89,7 +89,8 @@ def _no_number(name: str) -> None:
 def _finite(text: str) -> float:
     number = float(text)
     if abs(number) == float("inf"):
-        raise ValueError(f"{text[:40]} is not a number")
+        shown = text if len(text) <= 12 else f"{text[:4]}…{text[-4:]}"
+        raise ValueError(f"{shown} is too large a number")
     return number
 
 

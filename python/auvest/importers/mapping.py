@@ -210,10 +210,10 @@ def _constant(stem: str, file: str, rows: list[Any]) -> Table:
         for column in columns:
             value = row[column.name]
             number = isinstance(value, (int, float)) and not isinstance(value, bool)
-            if not number or not column.low <= value <= column.high:
+            if not number or (column.integer and value % 1):
                 raise MappingError(f"{stem}: {column.name} is {value!r}, not {column.expected}")
-            if column.integer and value != int(value):
-                raise MappingError(f"{stem}: {column.name} is {value!r}, not {column.expected}")
+            if not column.low <= value <= column.high:
+                raise MappingError(f"{stem}: {column.name} is {value!r}, outside {column.span}")
     return Table(file, columns, rows=tuple(rows))
 
 

@@ -39,13 +39,14 @@ class RosBag(Recording):
         """See :class:`Recording`."""
         try:
             yield from self._messages(topics)
-        except LogError:
+        except (LogError, MissingPackage):
             raise
         except Exception as error:
             # What a damaged bag raises in the package, or in the storage below it, is not listed
             # anywhere: zlib's, lz4's, SQLite's, struct's errors and others.
             raise LogError(
-                self.path, f"is not a bag that can be read: {type(error).__name__}: {error}"[:400]
+                self.path,
+                f"is not a bag that can be read: {str(error) or type(error).__name__}"[:400],
             ) from None
 
     def _messages(self, topics: Container[str] | None) -> Iterator[Message]:

@@ -22,6 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from auvest._outputs import NewFolder, OutputError, is_plain_file
+from auvest._texts import other_cells
 from auvest.importers.robots import Robots, within
 from auvest.logs.reader import LogError, LogFolder, Rows
 from auvest.logs.write import write_file
@@ -480,7 +481,7 @@ def _numbers(
     for number, line in zip(numbers, lines, strict=False):
         cells = line.split(between)
         if len(cells) != columns:
-            raise LogError(path, f"{len(cells)} cells, expected {columns}: truncated?", line=number)
+            raise LogError(path, other_cells(len(cells), columns), line=number)
         for cell in cells:
             try:
                 float(cell.replace("_", "?"))  # 1_000 is Python's, not a number

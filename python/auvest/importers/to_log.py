@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TextIO
 
 from auvest._outputs import NewFolder, OutputError
+from auvest._texts import counted
 from auvest.importers.expressions import WITHIN_S, MappingError, NoSuchField, NotANumber, step
 from auvest.importers.formats import open_recording
 from auvest.importers.mapping import INCREMENTS, LogMapping, Table
@@ -125,7 +126,10 @@ class _Writing:
             *(f"nothing for {file}" for file in empty),
             *(f"left out: {count} {what}" for what, count in self._left_out.items()),
             *(f"passed over: {count} x {what}" for what, count in self._recording.skipped.items()),
-            *(f"{file}: times go back {count} x" for file, count in (+self._goes_back).items()),
+            *(
+                f"{file}: times go back {counted(count, 'time')}"
+                for file, count in (+self._goes_back).items()
+            ),
         ]
 
     def _open(self, table: Table, stack: ExitStack) -> None:
@@ -199,10 +203,11 @@ class _Writing:
                 self._left_out[f"messages of {message.topic} without {column.name}"] += 1
                 return
             if not column.low <= value <= column.high or (column.integer and value % 1):
-                hint = f" ({column.suspicion})" if column.suspicion else ""
+                suspicion, _ = column.suspect(value)
+                hint = f" ({suspicion})" if suspicion else ""
                 raise RecordingError(
                     recording.path, message.where,
-                    f"{column.name} would be {value:.10g}, not {column.expected}{hint}",
+                    f"{column.name}: {column.breach(value)}{hint}",
                 )  # fmt: skip
             row.append(int(value) if column.integer else float(value))
         time_s = row[0]

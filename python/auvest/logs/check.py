@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from auvest._texts import short
 from auvest.logs.findings import Finding, finding
 from auvest.logs.layout import FILES
 from auvest.logs.origin import local_origin
@@ -48,6 +49,8 @@ CODE_JUMP = 4.0
 STEPS_PER_LINE = 1000
 #: The least and the most x and y of no place at all.
 NOWHERE = np.array([[math.inf, math.inf], [-math.inf, -math.inf]])
+#: A file's name is so much like that of a log's file that this may be meant.
+NEAR_NAME = 0.7
 #: Longest and most telling steps that are remembered.
 _KEPT = 8
 
@@ -332,8 +335,8 @@ class Survey:
             why = f" {causes[0].text}" if causes else " Do all files have one clock, in seconds?"
             raise LogError(
                 log["odometry.csv"].path,
-                f"{lines} lines of {last - first:.4g} s would be more than {STEPS_PER_LINE} steps "
-                f"of {limits.max_step_s:g} s each.{why}",
+                f"{lines} lines over {short(last - first, 4)} s: more than {STEPS_PER_LINE} steps "
+                f"of {limits.max_step_s:g} s for each line.{why}",
                 column="time_s",
                 cause=causes[0].cause if causes else "clocks_apart",
             )
@@ -400,9 +403,12 @@ def ignored_files(folder: Path, read: Collection[str] = ()) -> Iterator[Finding]
             continue
         if path.name in FILES or not table or path.name.startswith(".") or not path.is_file():
             continue
-        meant = difflib.get_close_matches(path.name.lower(), list(FILES), 1, 0.8)
-        hint = f"; is it meant to be {meant[0]}?" if meant else ""
-        message = f"is not read: a log has {', '.join(FILES)}{hint}"
+        stems = [name.removesuffix(".csv") for name in FILES]
+        meant = difflib.get_close_matches(path.stem.lower(), stems, 1, NEAR_NAME)
+        hint = " (auvest check --layout lists them)"
+        if meant:
+            hint = f"; is it meant to be {meant[0]}.csv?"
+        message = f"is not read: no file of a log has that name{hint}"
         yield finding("ignored_file", message, file=path.name)
 
 
@@ -443,21 +449,21 @@ def _units(files: dict[str, FileSeen], limits: Limits) -> Iterator[Finding]:
 
 
 def _thousandths(name: str, step: float, seen: FileSeen) -> Finding:
-    micro = step > 60_000.0
-    unit = "microseconds" if micro else "milliseconds"
-    line = 2
+    units = (("milliseconds", 1e-3), ("microseconds", 1e-6), ("nanoseconds", 1e-9))
+    unit, size = units[(step > 6e4) + (step > 6e7)]
     message = (
-        f"lines follow each other every {step:.4g}, over {seen.span_s:.4g} in all: {unit} "
-        f"for seconds? With those it would be {step * (1e-6 if micro else 1e-3):.3g} s"
+        f"lines are {short(step, 4)} s apart, {short(seen.span_s, 4)} s in all: {unit} for "
+        f"seconds? Then they are {short(step * size)} s apart"
     )
-    return finding(unit, message, file=name, line=line)
+    cause = "milliseconds" if unit == "milliseconds" else "microseconds"
+    return finding(cause, message, file=name, line=2)
 
 
 def _clocks(files: dict[str, FileSeen]) -> Iterator[Finding]:
     for name, seen in files.items():
         if seen.back is not None and -seen.back.length_s > BACK_S:
             by = -seen.back.length_s
-            message = f"the clock goes back by {by:.4g} s, to {seen.back.end_s:.10g} s"
+            message = f"the clock goes back by {short(by, 4)} s, to {seen.back.end_s:.10g} s"
             yield finding("clock_jump", message, file=name, line=seen.back.line)
     main = _main(files)
     if main is None or main.lines < 2:
@@ -505,7 +511,7 @@ def _gaps(files: dict[str, FileSeen], limits: Limits) -> Iterator[Finding]:
     for step in sorted(odometry.long, key=lambda one: one.line):
         if step not in jumps and step.moving and step.length_s > limits.gap_s:
             message = (
-                f"no line for {step.length_s:.3g} s while the craft moves; a velocity holds for "
+                f"no line for {short(step.length_s)} s while the craft moves; a velocity holds for "
                 f"{limits.gap_s:g} s"
             )
             yield finding("odometry_gap", message, file="odometry.csv", line=step.line)

@@ -16,8 +16,8 @@ from pathlib import Path
 from statistics import median
 
 from auvest._outputs import is_plain_file
-from auvest.logs.layout import COLUMNS, FILES, match
-from auvest.logs.reading import SEPARATORS, UNITS, FileReading, columns_of, seconds_of
+from auvest.logs.layout import COLUMNS, FILES, TURN, match
+from auvest.logs.reading import SEPARATORS, UNITS, FileReading, columns_of, parted, seconds_of
 
 #: No craft dives faster than this, m/s.
 DIVE_M_S = 3.0
@@ -41,12 +41,6 @@ NAMES: Mapping[str, str] = {
     r"gyro_?z|yaw_?rate|r|w_?z": "yaw_rate_rad_s",
     r"depth|keller|pole": "depth_m",
 }
-#: Units as headers write them.
-_WRITTEN = {
-    "mm_s": "mm/s", "cm_s": "cm/s", "m_s": "m/s", "km_h": "km/h", "knots": "kn", "kt": "kn",
-    "kts": "kn", "deg_s": "deg/s", "rad_s": "rad/s", "degrees": "deg", "°": "deg", "sec": "s",
-    "msec": "ms", "usec": "us", "µs": "us",
-}  # fmt: skip
 #: Words in the name of a file of places that say what they are.
 _PLACES = ("truth", "start", "leaders", "beacons", "positions")
 
@@ -199,7 +193,7 @@ def _columns(seen: Table) -> dict[str, tuple[str, str]]:
     found: dict[str, tuple[str, str]] = {}
     named_source = None
     for k, own in enumerate(seen.header):
-        name, unit = _parted(own)
+        name, unit = parted(own)
         column = name if name in COLUMNS else next(
             (one for words, one in NAMES.items() if re.fullmatch(words, name)), None
         )  # fmt: skip
@@ -227,23 +221,6 @@ def _columns(seen: Table) -> dict[str, tuple[str, str]]:
     return found
 
 
-def _parted(own: str) -> tuple[str, str]:
-    """Part the name of a column and its unit: ``Speed [mm/s]``, ``depth_cm``, ``heading (deg)``."""
-    text = own.strip().lower()
-    if text in COLUMNS:
-        return text, ""
-    inside = re.fullmatch(r"(.+?)[\s_]*[\[(]\s*(.+?)\s*[\])]", text)
-    name, unit = inside.groups() if inside else (text, "")
-    name = re.sub(r"[\s\-.]+", "_", name.strip())
-    units = {unit for kinds in UNITS.values() for unit in kinds} | set(_WRITTEN)
-    if not unit:
-        for end in sorted(units, key=len, reverse=True):
-            if name.endswith(f"_{end}"):
-                name, unit = name.removesuffix(f"_{end}"), end
-                break
-    return name, _WRITTEN.get(unit, unit)
-
-
 def _all_times(cells: list[str]) -> bool:
     try:
         return [seconds_of(cell) for cell in cells] != []
@@ -266,7 +243,7 @@ def _by_size(column: str, numbers: list[float]) -> str:
     if unit == "s":
         limits = {"ns": 1e17, "us": 1e14, "ms": 1e11}
         return next((name for name, low in limits.items() if largest > low), "")
-    if unit == "rad" and largest > 2 * math.pi + 1e-6:
+    if unit == "rad" and largest > TURN:
         return "deg"
     if unit == "deg" and largest > 360:
         return "1e-7 deg"

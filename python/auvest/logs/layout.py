@@ -14,7 +14,8 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-_TURN = 2 * math.pi + 1e-6
+#: A full turn, however it was rounded.
+TURN = 2 * math.pi + 1e-4
 
 Unit: TypeAlias = Literal["s", "m", "m/s", "rad", "rad/s", "deg", ""]
 
@@ -37,7 +38,19 @@ class Column:
     def expected(self) -> str:
         """What a value must be, in words."""
         kind = "an integer" if self.integer else "a number"
-        return f"{kind} from {self.low:.6g} to {self.high:.6g}"
+        return f"{kind} from {self.low:.10g} to {self.high:.10g}"
+
+    @property
+    def span(self) -> str:
+        """The limits with the unit."""
+        return f"{self.low:.10g}..{self.high:.10g} {self.unit}".rstrip()
+
+    def breach(self, value: float, given: str = "") -> str:
+        """Say what is wrong with a value that the column does not take, shown as it was given."""
+        shown = given or f"{value:.10g}"
+        if not math.isfinite(value) or (self.integer and value % 1):
+            return f"{shown} is not {self.expected}"
+        return f"{shown} lies outside {self.span}"
 
     @property
     def unit(self) -> Unit:
@@ -57,7 +70,13 @@ class Column:
             code = self.name == "range_m" and math.isfinite(value)
             return ("a code for 'no echo'?", "no_echo") if code else ("", "unreadable")
         if self.name == "time_s":
-            return self.suspicion, "milliseconds" if abs(value) < 1e14 else "microseconds"
+            if value < 0:
+                return "", "unreadable"
+            if value < 1e14:
+                return "milliseconds?", "milliseconds"
+            return "microseconds?" if value < 1e17 else "nanoseconds?", "microseconds"
+        if self.name == "temperature_c" and value < self.low:
+            return "a code for 'no value'?", self.cause
         return self.suspicion, self.cause
 
     def takes(self, values: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
@@ -96,14 +115,14 @@ def _speed(name: str) -> Column:
 
 
 def _angle(name: str) -> Column:
-    return Column(name, -_TURN, _TURN, "degrees?", cause="degrees")
+    return Column(name, -TURN, TURN, "degrees?", cause="degrees")
 
 
 #: Every column that a file can have, by its name.
 COLUMNS: Mapping[str, Column] = {
     column.name: column
     for column in (
-        Column("time_s", -1e11, 1e11, "milliseconds or nanoseconds?", cause="milliseconds"),
+        Column("time_s", -1e11, 1e11),
         Column("time", -1e11, 1e11),
         Column("source", 0, 1e9, integer=True),
         _length("forward_m"),

@@ -16,11 +16,14 @@ import numpy as np
 import numpy.typing as npt
 
 from auvest._outputs import is_plain_file
+from auvest._texts import other_cells
 from auvest.logs.layout import COLUMNS, FILES, match, near
-from auvest.logs.reading import Axes, FileReading, Reading, seconds_of
+from auvest.logs.reading import Axes, FileReading, Reading, seconds_of, unit_of
 
 Rows = npt.NDArray[np.float64]
 
+#: What is wrong with a line that holds one.
+CARRIAGE_RETURN = "has a carriage return within it: lines must end with LF or CRLF"
 #: Lines read at once: a few megabytes, and long enough that the cost of a chunk does not count.
 CHUNK_LINES = 32768
 _LINE_BYTES = 40  # or so
@@ -278,7 +281,8 @@ class CsvTable:
             try:
                 return next(csv.reader([text], delimiter=separator), [])
             except csv.Error as error:
-                raise LogError(self.path, f"is no line of cells: {error}", line=line) from None
+                why = CARRIAGE_RETURN if "\r" in text else f"is no line of cells: {error}"
+                raise LogError(self.path, why, line=line) from None
         return text.split(separator)
 
     def _named(self, header: list[str]) -> dict[str, int]:
@@ -321,15 +325,19 @@ class CsvTable:
             wrong = found is None or (stem not in stems and unit in _OTHER_UNITS)
             if name not in known and meant and wrong and name not in self._mapped():
                 raise LogError(
-                    self.path, f"its unit is not known here; expected {meant[0]}", line=1,
+                    self.path, f"a log has {meant[0]}{self._conversion(name, meant[0])}", line=1,
                     column=name,
                 )  # fmt: skip
         twice = found is not None and any(names.count(names[cells[one]]) > 1 for one in found.given)
         if found is None or twice:
             expected = " or ".join(str(layout) for layout in FILES[self.name])
+            if self.bytes == 0:
+                raise LogError(self.path, f"is empty; its first line must be {expected}")
             said = f"; {self._reading.where} names columns" if self._reading.columns else ""
             raise LogError(
-                self.path, f"the header must be {expected}, not {','.join(names)}{said}", line=1
+                self.path,
+                f"the header must be {expected}, not {','.join(names) or 'blank'}{said}",
+                line=1,
             )
         self.columns = found.columns
         self._given = found.given
@@ -338,6 +346,15 @@ class CsvTable:
         self.ignored = [name for k, name in enumerate(names) if k not in self._used]
         self._plain = self._used == list(range(len(names)))
         self._limits = [COLUMNS[one] for one in self._given]
+
+    def _conversion(self, name: str, meant: str) -> str:
+        """Say which settings take a column in another unit for one of a log; "" if none do."""
+        unit = unit_of(name, meant)
+        stem = self.name.removesuffix(".csv")
+        return unit and (
+            "; auvest init LOG writes the settings that convert it "
+            f'([columns.{stem}] {meant} = "{name}", [units.{stem}] {meant} = "{unit}")'
+        )
 
     def _mapped(self) -> set[str]:
         return {said.removeprefix("-") for said in self._reading.columns.values()}
@@ -417,11 +434,9 @@ class CsvTable:
         expected = len(self._header)
         if len(cells) != expected:
             comma = len(cells) > expected and all(map(_digits, cells))
-            why = "decimal commas?" if comma else "truncated?"
-            raise LogError(
-                self.path, f"{len(cells)} cells, expected {expected}: {why}",
-                line=line, cause="decimal_comma" if comma else "unreadable",
-            )  # fmt: skip
+            cause = "decimal_comma" if comma else "unreadable"
+            message = other_cells(len(cells), expected)
+            raise LogError(self.path, message, line=line, cause=cause)
         values = []
         for k, given in zip(self._used, self._given, strict=True):
             cell = cells[k]
@@ -470,12 +485,15 @@ class CsvTable:
             suspicion, cause = column.suspect(value)
             hint = f" ({suspicion})" if suspicion else ""
             missing = "; leave out the row where there is no measurement" if value != value else ""
-            if self._given[k] in self._reading.units:
-                unit = self._reading.units[self._given[k]]
-                missing += f"; {self._reading.where} takes the file's numbers in {unit!r}"
+            given, unit = "", self._reading.units.get(self._given[k], "")
+            if unit:
+                missing += f"; {self._reading.units_where} says {unit!r}"
+                given = f"{value / self._factors[k]:.10g} {unit}"
+                if unit != column.unit:
+                    given += f" = {value:.10g} {column.unit}"
             raise LogError(
                 self.path,
-                f"{value:.10g} is not {column.expected}{hint}{missing}",
+                f"{column.breach(value, given)}{hint}{missing}",
                 line=first + i,
                 column=self._header[self._used[k]].strip(),
                 cause=cause,
@@ -493,6 +511,13 @@ def _digits(cell: str) -> bool:
     """Whether a cell is what a decimal comma leaves of a number."""
     bare = cell.strip().strip('"').lstrip("+-")
     return bare.isdecimal() and bare.isascii()
+
+
+def not_a_folder(path: Path) -> str:
+    """Say why a path is not that of a log's folder."""
+    if path.exists():
+        return "is a file; a log is a folder of CSV files (auvest check --layout)"
+    return "there is no such folder"
 
 
 class LogFolder:
@@ -523,9 +548,7 @@ class LogFolder:
     def __init__(self, path: Path, *, truth: bool = True, reading: Reading | None = None) -> None:
         self.path = path
         if not path.is_dir():
-            raise LogError(
-                path, "is not a folder; a log is one of CSV files (auvest check --layout)"
-            )
+            raise LogError(path, not_a_folder(path))
         reading = Reading() if reading is None else reading
         paths = {name: path / (reading.of(name).file or name) for name in FILES}
         for name, one in paths.items():

@@ -28,6 +28,12 @@ UNITS: Mapping[Unit, Mapping[str, float]] = {
     "rad/s": {"rad/s": 1.0, "deg/s": _DEGREE, "mrad/s": 1e-3, "rpm": math.pi / 30},
     "deg": {"deg": 1.0, "rad": 1 / _DEGREE, "1e-7 deg": 1e-7},
 }  # fmt: skip
+#: Units as headers write them.
+_WRITTEN = {
+    "mm_s": "mm/s", "cm_s": "cm/s", "m_s": "m/s", "km_h": "km/h", "knots": "kn", "kt": "kn",
+    "kts": "kn", "deg_s": "deg/s", "rad_s": "rad/s", "degrees": "deg", "°": "deg", "sec": "s",
+    "msec": "ms", "usec": "us", "µs": "us",
+}  # fmt: skip
 #: What can part cells, by its name.
 SEPARATORS = (",", ";", "\t", "|", " ")
 
@@ -46,8 +52,8 @@ class FileReading:
         The name in the file's header of a column; a minus before it turns the sign.
     units : mapping of str to str
         The unit of a column.
-    where : str
-        The settings that say so, for messages.
+    where, units_where : str
+        The settings that say so, and those that say the units, for messages.
     """
 
     file: str = ""
@@ -56,6 +62,7 @@ class FileReading:
     columns: Mapping[str, str] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
     where: str = ""
+    units_where: str = ""
 
     def factor(self, column: str) -> float:
         """Say what a number of the file is to be multiplied with."""
@@ -95,6 +102,29 @@ def columns_of(name: str) -> list[str]:
         for column in spelling
     ]
     return list(dict.fromkeys([*own, *other]))
+
+
+def parted(own: str) -> tuple[str, str]:
+    """Part the name of a column and its unit: ``Speed [mm/s]``, ``depth_cm``, ``heading (deg)``."""
+    text = own.strip().lower()
+    if text in COLUMNS:
+        return text, ""
+    inside = re.fullmatch(r"(.+?)[\s_]*[\[(]\s*(.+?)\s*[\])]", text)
+    name, unit = inside.groups() if inside else (text, "")
+    name = re.sub(r"[\s\-.]+", "_", name.strip())
+    units = {unit for kinds in UNITS.values() for unit in kinds} | set(_WRITTEN)
+    if not unit:
+        for end in sorted(units, key=len, reverse=True):
+            if name.endswith(f"_{end}"):
+                name, unit = name.removesuffix(f"_{end}"), end
+                break
+    return name, _WRITTEN.get(unit, unit)
+
+
+def unit_of(name: str, column: str) -> str:
+    """Give the unit that a name ends with, if it is one of a column; else ""."""
+    unit = parted(name)[1]
+    return unit if unit in UNITS.get(COLUMNS[column].unit, {}) else ""
 
 
 _ISO = re.compile(

@@ -34,14 +34,14 @@ def write_file(folder: Path, name: str, **columns: npt.ArrayLike) -> None:
     found = match(name, columns)
     if found is None or set(found.given) != set(columns):
         known = ", ".join(f"({layout})" for layout in FILES[name])
-        raise ValueError(f"{name} must have the columns {known}, not {list(columns)}")
+        raise ValueError(f"{name} must have the columns {known}, not {', '.join(columns)}")
     for column in (COLUMNS[one] for one in found.given):
         given = np.asarray(columns[column.name])
         good = column.takes(given)
         if not good.all():
             k = int(np.argmin(good))
             raise ValueError(
-                f"{name}, row {k}, column {column.name}: {given[k]} is not {column.expected}"
+                f"{name}, row {k}, column {column.name}: {column.breach(float(given[k]))}"
             )
     folder.mkdir(parents=True, exist_ok=True)
     values = [np.asarray(columns[one]).tolist() for one in found.given]

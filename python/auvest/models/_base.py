@@ -244,8 +244,9 @@ class MeasurementModel(Model):
             does not say where it stands.
         """
         if not self.stands:
+            name = type(self).__name__
             raise ValueError(
-                f"{type(self).__name__} was made without {self.place}: say where it is"
+                f"{name} was made without {self.place}, which this needs: {name}({self.place}=...)"
             )
         least = len(self.observes)
         shape = np.shape(x)

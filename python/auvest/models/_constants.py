@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 from auvest._arguments import as_integer
@@ -16,8 +17,8 @@ def place() -> Any:
     """Take the place of a constant in the state; 0: none."""
 
     def take(name: str, given: object) -> int:
-        value = as_integer(name, given, 0, len(STATE) - 1)
-        if 0 < value < len(POSE):
+        value = as_integer(name, given, -sys.maxsize, sys.maxsize)
+        if value != 0 and not len(POSE) <= value < len(STATE):
             raise ValueError(f"{name} must be 0 or {len(POSE)}..{len(STATE) - 1}, not {value}")
         return value
 

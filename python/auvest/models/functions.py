@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from auvest import _core
-from auvest._arguments import DType, as_array, as_covariance, as_integer
+from auvest._arguments import DType, as_array, as_covariance, as_integer, type_name
 from auvest.models._base import MeasurementModel, ProcessModel, saved_as
 
 Array: TypeAlias = npt.NDArray[np.float64]
@@ -251,7 +251,7 @@ def _as_noise(value: npt.ArrayLike, states: int) -> Array:
 
 def _as_function(name: str, function: Any) -> Any:
     if not callable(function):
-        raise TypeError(f"{name} must be a function, not {type(function).__name__}")
+        raise TypeError(f"{name} must be a function, not {type_name(function)}")
     return function
 
 

@@ -132,12 +132,20 @@ def innovations(
         return shown
     named = diagnosis.diagnose(log, settings, filter_name, gross=bool(shown))
     if not named:
-        return shown
+        return [_with_causes(shown[0])] if len(shown) == 1 else shown
     # It explains why measurements do not fit, and why one source has more of it than others.
     explained = [one for one in shown if one.cause in ("innovations", "source_off", "start_off")]
     gravest = worst([named[0].verdict, *(one.verdict for one in explained)])
     named[0] = replace(named[0], verdict=gravest)
     return [*named, *(one for one in shown if one not in explained)]
+
+
+def _with_causes(alone: Finding) -> Finding:
+    """Say what may lie behind recoveries that nothing else explains."""
+    if alone.cause != "recoveries":
+        return alone
+    causes = "a range scale, a wrong survey or sigmas that are too small"
+    return replace(alone, message=f"{alone.message}; possible causes: {causes}")
 
 
 def check(path: Path, settings: Settings, filter_name: FilterName | None = None) -> Checked:

@@ -525,6 +525,8 @@ def _files(columns: dict[str, Any], units: dict[str, Any], source: str) -> dict[
                     _choose(kinds, value, f"{where} {column}")
             before = made.get(stems[stem], FileReading(where=where))
             changed: dict[str, Any] = {section: given, **options}
+            if section == "units":
+                changed["units_where"] = where
             made[stems[stem]] = replace(before, **changed)
     return made
 

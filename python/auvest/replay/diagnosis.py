@@ -15,6 +15,7 @@ from functools import partial
 import numpy as np
 
 from auvest._arguments import Floats
+from auvest._texts import short
 from auvest.errors import FilterError
 from auvest.logs import LogError, LogFolder
 from auvest.logs.changed import Change, ChangedLog, HeldLog, columns_changed
@@ -143,8 +144,9 @@ def diagnose(
     found = {}
     for fit in named[:2]:
         other = " (or another cause that the log cannot tell from it)" * (len(named) > 1)
-        each = (fit.log_likelihood - base) / count
-        message = f"{fit.hypothesis.message}{other}: likelier by {each:.2g} nats per measurement"
+        times = short(math.exp((fit.log_likelihood - base) / count))
+        each = f"each measurement is then {times} times as likely"
+        message = f"{fit.hypothesis.message}{other}; {each}"
         found[fit.hypothesis.cause] = finding(fit.hypothesis.cause, message)
     return list(found.values())
 
@@ -309,7 +311,8 @@ def _families(log: LogFolder, rows: Columns, *, gross: bool) -> Iterator[list[Hy
         lambda scale: Hypothesis(
             "range_scale",
             measured(_of_range(lambda r: r * scale)),
-            f"ranges times {scale:.3f} fit: a scale (speed of sound, antenna delay)",
+            f"ranges times {scale:.3f} fit: a wrong speed of sound, or another unit? water.csv "
+            "corrects the first, [constants] range_scale finds it",
         ),
         SCALES,
     )
@@ -386,8 +389,10 @@ def _headings(log: LogFolder, *, mirrored: bool) -> Iterator[Hypothesis]:
     sign = -1.0 if mirrored else 1.0
     for angle in angles:
         degrees = math.degrees(angle)
-        how = f"{what} times -1 plus {degrees:g}" if mirrored else f"{what} plus {degrees:g}"
-        message = f"it fits with the {how} degrees"
+        more = f"{'less' if degrees < 0 else 'plus'} {abs(degrees):g} degrees"
+        message = f"it fits with the {what} {more}"
+        if mirrored:
+            message = f"it fits with the {what} of the other sign" + f", {more}" * (angle != 0)
         turned = columns_changed({3: partial(_turned, sign, angle)})
         if tracking:
             yield Hypothesis(cause, {"fixes.csv": turned}, message)
@@ -425,7 +430,7 @@ def _speeds(log: LogFolder, scale: float) -> Hypothesis:
     at = [k for k, name in enumerate(log["odometry.csv"].names) if name in moved]
     changes = columns_changed({k: lambda rows, k=k: scale * rows[:, k] for k in at})  # type: ignore[misc]
     off, unit = min((abs(scale / size - 1), unit) for unit, size in SPEED_UNITS.items())
-    told = f": told in {unit}?" if off < NEAR_UNIT else ""
+    told = f" (written in {unit}?)" if off < NEAR_UNIT else ""
     message = f"it fits with speeds and distances times {scale:.3f}{told}"
     return Hypothesis("speed_scale", {"odometry.csv": changes}, message)
 

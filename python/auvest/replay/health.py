@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from auvest._arguments import Floats
+from auvest._texts import counted
 from auvest.logs.findings import Finding, Verdict, finding, worst
 from auvest.replay import tables
 from auvest.replay.samples import Samples
@@ -289,15 +290,13 @@ def findings(residuals: Residuals) -> list[Finding]:
                 "outliers apart"
             )
             found.append(finding("innovations", message))
+    found += _apart(rows, inside)
     least = max(RECOVERIES_DOUBTFUL, RECOVERY_SHARE * count)
     if residuals.recoveries >= least:
-        message = (
-            f"the filter lost its track {residuals.recoveries} times in {count} measurements: a "
-            "range scale, a wrong survey or sigmas that are too small"
-        )
+        message = f"the filter lost its track {residuals.recoveries} times in {count} measurements"
         bad = residuals.recoveries >= RECOVERIES_NOT_TRUSTED
         found.append(finding("recoveries", message, verdict="not_trusted" if bad else "doubtful"))
-    return found + _apart(rows, inside)
+    return found
 
 
 def _refused(residuals: Residuals) -> list[Finding]:
@@ -427,7 +426,7 @@ def health(residuals: Residuals, found: Iterable[Finding]) -> Health:
     count = len(rows["nis"])
     reasons = [one.text for one in found if one.verdict == verdict]
     if verdict == "sound":
-        few = f"only {count} measurements: hardly anything to judge by"
+        few = f"only {counted(count, 'measurement')}: hardly anything to judge by"
         reasons = [few if count < FEW else _size(_share(rows, within(rows)))]
         if count == 0 and residuals.judged:
             reasons = [f"the gate refused {residuals.refused} of {residuals.judged} echoes"]

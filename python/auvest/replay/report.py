@@ -14,6 +14,7 @@ from html import escape
 from importlib import resources
 from typing import Any
 
+from auvest._texts import beside, counted
 from auvest.registry import filter_named
 from auvest.replay import drawing, tables
 from auvest.replay.constants import Found
@@ -215,15 +216,18 @@ def _share(value: float | None) -> str:
 def _nis(numbers: dict[str, Any]) -> str:
     if numbers["nis_mean"] is None:
         return ""
-    low, high = numbers["nis_bounds_95"]
-    return f"{numbers['nis_mean']:.3f} (consistent: {low:.3f} to {high:.3f})"
+    return _against(numbers["nis_mean"], *numbers["nis_bounds_95"])
 
 
 def _nis_within(health: Health) -> str:
     if health.nis_mean is None or health.nis_bounds_95 is None:
         return ""
-    low, high = health.nis_bounds_95
-    return f"{health.nis_mean:.3f} (consistent: {low:.3f} to {high:.3f})"
+    return _against(health.nis_mean, *health.nis_bounds_95)
+
+
+def _against(mean: float, low: float, high: float) -> str:
+    where = beside(mean, low, high)
+    return f"{mean:.3f}, {where} the {low:.3f} to {high:.3f} of a consistent filter"
 
 
 def sources(health: Health) -> list[tuple[str, str]]:
@@ -231,7 +235,8 @@ def sources(health: Health) -> list[tuple[str, str]]:
     return [
         (
             f"source {one.source}",
-            f"{one.measurements} measurements, {100 * one.beyond_share:.0f} % beyond three sigma, "
+            f"{counted(one.measurements, 'measurement')}, "
+            f"{100 * one.beyond_share:.0f} % beyond three sigma, "
             f"median {one.median_m:+.2f} m, spread {one.spread_m:.2f} m, "
             f"{100 * one.trend:+.2f} % of the range",
         )

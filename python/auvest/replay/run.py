@@ -152,12 +152,14 @@ def replay(
     OSError
         If a file cannot be written.
     """
-    if lag_s is not None and not (smooth and 0 <= lag_s < math.inf):
-        raise ValueError(f"lag_s must be finite, not negative, and with smooth, not {lag_s}")
+    if lag_s is not None and not smooth:
+        raise ValueError("lag_s is for smooth=True")
+    if lag_s is not None and not 0 <= lag_s < math.inf:
+        raise ValueError(f"lag_s must be finite and not negative, not {lag_s}")
     for kind, given, known in (("write", write, WRITTEN), ("formats", formats, FORMATS)):
         for one in given:
             if one not in known:
-                raise ValueError(f"{kind} must be of {', '.join(known)}, not {one!r}")
+                raise ValueError(f"{kind}: {one!r} is not one of {', '.join(known)}")
     if not 0 <= every_s < math.inf:
         raise ValueError(f"every_s must be finite and not negative, not {every_s}")
     name = checks.filter_of(log, settings, filter_name)

@@ -68,7 +68,8 @@ def only_sensor(
     """
     sensors = list(filter.sensors.values())
     if len(sensors) != 1 or not isinstance(sensors[0], kind):
-        raise ValueError(f"filter must have one {kind.__name__} as its sensor, not {sensors}")
+        there = ", ".join(type(sensor).__name__ for sensor in sensors) or "none"
+        raise ValueError(f"filter must have one {kind.__name__} as its only sensor; it has {there}")
     return sensors[0]
 
 

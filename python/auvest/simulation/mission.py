@@ -25,6 +25,7 @@ from auvest._fields import (
     number,
     positive,
 )
+from auvest._texts import counted
 from auvest.guidance import DubinsPath, SplinePath
 from auvest.intervals import (
     FixedInterval,
@@ -311,8 +312,8 @@ def simulate(
     rows = min(int(longest / mission.period_s) + 2, _ROWS) if record else 0
     if mission.runs * rows > MAX_STEPS:
         raise ValueError(
-            f"{mission.runs} runs of {rows} steps are more than {MAX_STEPS:,}: record=False keeps "
-            "the numbers of each run alone"
+            f"{counted(mission.runs, 'run')} of {rows} steps are more than {MAX_STEPS:,}: "
+            "record=False keeps the numbers of each run alone"
         )
     values = {
         **core_scenario(mission),

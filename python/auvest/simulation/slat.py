@@ -28,6 +28,7 @@ from auvest._fields import (
     number,
     positive,
 )
+from auvest._texts import counted
 from auvest.simulation._runs import Runs, collect, nees_of_plane, standard_error
 from auvest.slat import MAX_MASTERS, DeadReckoning, EkfSlat, Slatf, SlatFilter, SlatfJoint
 from auvest.slat.models import CompassMotion, Sonar, core_sonar
@@ -146,10 +147,16 @@ class SlatScenario(Checked):
             raise ValueError(f"masters must be a tuple of 1 to {MAX_MASTERS} Vehicle")
         for n, master in enumerate(self.masters):
             as_instance(f"masters[{n}]", master, Vehicle)
-        if not 1 <= self.pings <= MAX_PINGS // self.runs:
+        if self.pings < 1:
+            every_s = self.odometry_s * self.odometry_per_ping
             raise ValueError(
-                f"duration_s gives {self.pings} pings per run; runs * pings must lie in "
-                f"{self.runs}..{MAX_PINGS}"
+                f"duration_s = {self.duration_s:g} is too short for one ping: a ping comes every "
+                f"{every_s:g} s"
+            )
+        if self.pings > MAX_PINGS // self.runs:
+            raise ValueError(
+                f"{counted(self.runs, 'run')} of {counted(self.pings, 'ping')} are more than "
+                f"{MAX_PINGS} pings: fewer runs, or a shorter duration_s"
             )
 
     @property

@@ -30,9 +30,11 @@ from auvest._arguments import (
     far_from_origin,
     impossible_range,
     require_range,
+    step_too_long,
 )
 from auvest._core import Status
 from auvest._interrupts import first_slice, in_slices
+from auvest._texts import counted
 from auvest.errors import FilterError, Interrupted
 from auvest.slat.models import (
     CompassMotion,
@@ -87,6 +89,7 @@ class Steps:
     _random: _core.Random
     _status: Status
     _exclusive: Exclusive
+    _settings: dict[str, Any]  # beside motion, sonar and dtype: all that makes the filter
     _deaf: bool = False  # hears no echo, so that it does not matter whose it is
     _births: bool = False  # an echo of which nothing is said is of nobody knows whom
     _shared: bool = False  # one covariance for all particles: every echo must be somebody's
@@ -312,7 +315,8 @@ class Steps:
                 rebirths=out["rebirths"][:done],
             )
             self._status = status
-            hint = self._why(status, echoes, sonar)
+            step_s = times[done + 1] - times[done] if status == Status.step_too_long else 0.0
+            hint = self._why(status, step_s, echoes, sonar)
         if status != Status.ok:
             raise FilterError("run", status, step=done, partial=result, hint=hint)
         if interrupted:
@@ -473,12 +477,14 @@ class Steps:
                 if self._shared and error.status == Status.bad_parameter:
                     raise ValueError(_NEEDS_KNOWN) from None
                 action = name if name == "update" else f"{name}(dt={plain[0]})"
-                hint = self._why(error.status, *heard)
+                hint = self._why(error.status, plain[0], *heard)
                 raise FilterError(action, error.status, hint=hint) from None
             self._status = Status.ok
 
-    def _why(self, status: Status, z: Any, sonar: Sonar | None) -> str:
+    def _why(self, status: Status, dt: Any, z: Any, sonar: Sonar | None) -> str:
         """Explain a status that says less than is known here; empty for the others."""
+        if status == Status.step_too_long:
+            return step_too_long(f"dt = {float(dt):.6g} s", self._settings["longest_step_s"])
         if status == Status.impossible_range:
             device = sonar or self._sonar
             ranges = np.asarray(z, np.float64).reshape(-1, 2)[:, 0]
@@ -543,7 +549,9 @@ class Steps:
         numbers = np.ascontiguousarray(np.broadcast_to(raw, (count,)), dtype=np.int64)
         for number in np.unique(numbers):
             if not UNKNOWN_MASTER <= number < masters:
-                raise ValueError(f"master is {number}, but the filter has {masters} masters")
+                raise ValueError(
+                    f"master is {number}, but the filter has {counted(masters, 'master')}"
+                )
             if self._shared and number == UNKNOWN_MASTER:
                 raise ValueError(_NEEDS_KNOWN)
         return numbers
@@ -562,7 +570,6 @@ class SlatFilter(Steps):
 
     _max_masters: int = MAX_MASTERS
     _start: tuple[Floats, Floats, int, int]  # x0, P0, seed and stream: with all else, what it was
-    _settings: dict[str, Any]  # beside motion, sonar and dtype: all that makes the filter
 
     def __init__(
         self,
@@ -677,7 +684,7 @@ class SlatFilter(Steps):
         with self._exclusive:
             number: int = self._core_steps.masters
             if number == self._max_masters:
-                raise ValueError(f"the filter has {number} masters already, that is all")
+                raise ValueError(f"the filter has {counted(number, 'master')} already, that is all")
             try:
                 self._core_steps.add_master(state, covariance)
             except _core.StatusError as error:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from auvest import _core
 from auvest._arguments import Exclusive, Floats, as_array, as_instance, far_from_origin
 from auvest._core import Status
+from auvest._texts import counted
 from auvest.errors import FilterError
 from auvest.slat._base import SlatFilter, Steps, as_covariance
 from auvest.slat.dead_reckoning import DeadReckoning
@@ -50,6 +51,7 @@ class Outage(Steps):
     def _prepare(self) -> None:
         self._exclusive = Exclusive()
         self._device = self._filter._device
+        self._settings = self._filter._settings
         name = f"SlatOutage_{self._motion.name}_{self._dtype.name}"
         self._core_steps = getattr(_core, name)(self._filter._core_steps)
 
@@ -88,7 +90,9 @@ class Outage(Steps):
         self._require_local("x", state)
         most = self._filter._max_masters
         if len(masters) > most:
-            raise ValueError(f"masters has {len(masters)} elements, at most {most} are taken")
+            raise ValueError(
+                f"masters has {counted(len(masters), 'element')}, at most {most} are taken"
+            )
         states = np.empty((len(masters), 6), self._dtype)
         covariances = np.empty((len(masters), 6, 6), self._dtype)
         for k, (one_x, one_p) in enumerate(masters):

@@ -15,6 +15,7 @@ from concurrent.futures import CancelledError
 from contextlib import ExitStack, suppress
 from typing import Any
 
+from auvest._texts import listed
 from auvest.commands.version import version
 from auvest.errors import SweepError
 from auvest.montecarlo import Columns
@@ -147,12 +148,16 @@ class _Run:
             except Exception as error:  # it has no auvest, or one without sweeps; or it is gone
                 if name not in self._workers():
                     continue
-                found = f"none that answers ({error})"
+                self._refuse(name, f"gives no answer ({error})")
+                continue
             if found == version():
                 self._threads[name] = there[name]["nthreads"]
             else:
-                self._refused[name] = f"auvest {found}"
-                self._warn(f"worker {name} is refused: it has auvest {found}, not {version()}")
+                self._refuse(name, f"has auvest {found}")
+
+    def _refuse(self, name: str, why: str) -> None:
+        self._refused[name] = why
+        self._warn(f"worker {name} is refused: it {why}; auvest {version()} is needed")
 
     def _workers(self) -> dict[str, Any]:
         workers: dict[str, Any] = self._client.sync(self._client.scheduler.identity)["workers"]
@@ -162,14 +167,18 @@ class _Run:
         """Take a task back, unless it has taken too many workers with it."""
         self._losses[task.key] = self._losses.get(task.key, 0) + 1
         if self._losses[task.key] == ATTEMPTS:
-            raise SweepError(f"{ATTEMPTS} workers could not do {task.parameters}: {why}")
+            raise SweepError(f"{ATTEMPTS} workers could not do {listed(task.parameters)}: {why}")
         self._todo.append(task)
 
     def _require_patience(self, idle_s: float) -> None:
         """End if no worker has come for too long; where some were refused none may be meant to."""
         if idle_s >= (_PATIENCE_REFUSED_S if self._refused else _PATIENCE_S):
-            reasons = "".join(f"; {name} has {why}" for name, why in self._refused.items())
-            raise SweepError(f"the cluster has no worker with auvest {version()}{reasons}")
+            reasons = "; ".join(f"{name} {why}" for name, why in self._refused.items())
+            raise SweepError(
+                f"no worker of the cluster can be used; auvest {version()} is needed: {reasons}"
+                if reasons
+                else "the cluster has no worker"
+            )
 
     def _send(self) -> None:
         """Give tasks to the workers that have the fewest."""

@@ -16,6 +16,7 @@ import threading
 from collections.abc import Iterator, Sequence
 from typing import IO, cast
 
+from auvest._texts import listed
 from auvest.errors import SweepError
 from auvest.montecarlo import Columns
 from auvest.sweeps.plan import Task
@@ -46,7 +47,7 @@ def rows_of(task: Task, answer: Columns | Failure) -> Columns:
     """
     if isinstance(answer, Failure):
         raise SweepError(
-            f"runs {task.first} to {task.first + task.count - 1} of {task.parameters}: "
+            f"runs {task.first} to {task.first + task.count - 1} of {listed(task.parameters)}: "
             f"{answer.text}"
         )
     return answer

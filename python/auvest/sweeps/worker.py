@@ -39,7 +39,7 @@ def report() -> str:
     from auvest.commands.version import version
 
     result = self_test()
-    return version() if result.ok else f"{version()}, whose self-test fails: {result}"
+    return version() if result.ok else f"{version()}, but its self-test fails ({result})"
 
 
 def serve() -> None:

@@ -27,7 +27,9 @@ from auvest.reproduce.constants import measure, page
 
 
 def _shown(result: measure.Bench) -> Iterator[Table]:
-    yield table("Simulated surveys", *measure.trial_table(result))
+    header, rows = measure.trial_table(result)
+    names, *numbers = zip(header, *rows, strict=True)  # on its side, for terminals are narrow
+    yield table("Simulated surveys", names, numbers, right=range(1, len(names)))
     if result.recordings:
         yield table("Recordings", *measure.recording_table(result))
 

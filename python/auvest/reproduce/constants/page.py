@@ -9,8 +9,8 @@ from auvest.reproduce.constants import measure, trials
 def page(result: measure.Bench) -> str:
     """Return the Markdown page."""
     held = result.held()
-    recordings = markdown.table(*measure.recording_table(result))
-    return markdown.page(
+    there = bool(result.recordings)
+    text = markdown.page(
         __name__,
         held=sum(held.values()),
         aims=len(held),
@@ -20,7 +20,9 @@ def page(result: measure.Bench) -> str:
         known=f"{100 * (measure.KNOWN - 1):.0f}",
         without=f"{100 * (measure.WITHOUT - 1):.0f}",
         share=f"{100 * measure.FOUND:.0f}",
-        labyrinth=measure.LABYRINTH_M,
+        data=" --data DIR" * there,
+        labyrinth=f"; labyrinth_uwb is at most {measure.LABYRINTH_M:g} m off" * there,
         trials=markdown.table(*measure.trial_table(result)),
-        recordings=recordings if result.recordings else "Made without the recordings.",
+        recordings=markdown.table(*measure.recording_table(result)),
     )
+    return text if there else text.partition("\n## Recordings")[0]

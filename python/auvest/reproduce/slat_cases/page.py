@@ -147,15 +147,16 @@ def _crossing_moral(results: Mapping[str, Any]) -> str:
     against = [row["joint_less_slatf2"] for row in results["crossing"]]
     slave = sum(lower(one["slave_rmse_m"]) for one in against)
     masters = sum(lower(one["master_rmse_m"]) for one in against)
-    worse = sum(
-        lower({**one["master_rmse_m"], "mean": -one["master_rmse_m"]["mean"]}) for one in against
-    )
+    worse = [
+        sum(lower({**one[key], "mean": -one[key]["mean"]}) for one in against)
+        for key in ("slave_rmse_m", "master_rmse_m")
+    ]
     return (
         "Against SLATF 2.0, whose particles are cheaper, SlatfJoint is clearly better for the "
         f"slave with {slave} of {len(against)} sonars, for the masters with {masters}, and clearly "
-        f"worse for the masters with {worse}. Any particles keep both answers; those of SlatfJoint "
-        "also keep the drift that slave and masters share, which shows in what they claim "
-        "(covered)."
+        f"worse for the slave with {worse[0]}, for the masters with {worse[1]}. Any "
+        "particles keep both answers; those of SlatfJoint also keep the drift that slave and "
+        "masters share, which shows in what they claim (covered)."
     )
 
 

@@ -23,6 +23,9 @@ def page(result: measure.Reproduction) -> str:
     by_name = {(row.source, row.track, row.interval_s): row for row in result.rows}
     clean = by_name["robust_model_aided", "lawnmower", 0.5].settled.value
     dirty = by_name["robust_model_aided_outliers", "lawnmower", 0.5].settled.value
+    adaptive = [row for row in result.rows if row.source in measure.POLICIES]
+    fixed = [by_name["ukf", row.track, row.interval_s] for row in adaptive]
+    better = [a.settled.value < b.settled.value for a, b in zip(adaptive, fixed, strict=True)]
     return markdown.page(
         __name__,
         result=result,
@@ -43,6 +46,8 @@ def page(result: measure.Reproduction) -> str:
         runs_table=rows(_reference_rows(result)),
         digits=len(result.checks) - len(free),
         digits_held=sum(check.ok for check in result.checks) - sum(check.ok for check in free),
+        better=sum(better),
+        policies=len(better),
         robust=100 * (dirty / clean - 1),
         consistency=rows(
             (
