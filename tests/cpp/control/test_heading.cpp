@@ -402,6 +402,10 @@ TEST_CASE_TEMPLATE("heading: what is refused changes nothing", Scalar, float, do
   REQUIRE(model.restart(Scalar(0.5)) == Status::kOk);
   CHECK(model.update(nan, 1, reference) == Status::kNotFinite);
   CHECK(model.update(0, -1, reference) == Status::kTimeBackwards);
+  CHECK(reference.value == Scalar(7));
+  CHECK(model.update(3, 0, reference) == Status::kOk);  // no time: it stays where it is
+  CHECK(reference.value == Scalar(0.5));
+  reference = reference_at<Scalar>(7);
   CHECK(model.restart(nan) == Status::kNotFinite);
   CHECK(model.state().value == Scalar(0.5));
   CHECK(reference.value == Scalar(7));

@@ -332,6 +332,7 @@ TEST_CASE_TEMPLATE("waypoints: what is refused, which leg and why; the old plan 
     CHECK(point.along_m == Scalar(20));
   }
   CHECK(path.locate(nan, 0, point) == Status::kNotFinite);
+  CHECK(path.locate(0, nan, point) == Status::kNotFinite);
   CHECK(point.along_m == Scalar(20));
   CHECK(path.leg() == 1);
 

@@ -189,4 +189,20 @@ TEST_CASE_TEMPLATE("dropped pivots: L L' gives P back, and no more rank", Scalar
   }
 }
 
+TEST_CASE("copy_where: all numbers of a belief and its lower triangle, or none") {
+  auvest::Belief<float, 3> from;
+  from.x << 1, 2, 3;
+  from.P << 4, -1, -1, 5, 6, -1, 7, 8, 9;
+  for (const bool where : {false, true}) {
+    auvest::Belief<float, 3> to;
+    to.x.setZero();
+    to.P.setZero();
+    auvest::math::copy_where(where, from, to);
+    for (int i = 0; i < 3; ++i) {
+      CHECK(to.x(i) == (where ? from.x(i) : 0.0f));
+      for (int j = 0; j <= i; ++j) CHECK(to.P(i, j) == (where ? from.P(i, j) : 0.0f));
+    }
+  }
+}
+
 }  // namespace

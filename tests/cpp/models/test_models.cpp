@@ -1138,6 +1138,9 @@ TEST_CASE("models refuse bad parameters") {
   auvest::ConstantVelocity<double>::Params straight;
   straight.sigma_acceleration_m_s2 = -1;
   CHECK(auvest::ConstantVelocity<double>(straight).check() == auvest::Status::kBadParameter);
+  straight = auvest::ConstantVelocity<double>::Params();
+  straight.velocity = -1;
+  CHECK(auvest::ConstantVelocity<double>(straight).check() == auvest::Status::kBadParameter);
 }
 
 template <class Scalar>

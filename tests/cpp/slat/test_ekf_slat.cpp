@@ -502,6 +502,24 @@ TEST_CASE("dead reckoning: before a start nothing is known; reads the lower tria
   CHECK(filter.slave().P(1, 0) == 0.5);
 }
 
+TEST_CASE("SLAT: the extent of a belief is by positions, speeds and accelerations, of all bodies") {
+  // x, y of the slave, and of one master x, y, vx, vy, ax, ay; an angle of the slave counts as its
+  // position does.
+  using Filter = OpenEkf<Compass<double>, Master<double>, 1>;
+  for (int i = 0; i < 8; ++i) {
+    Belief<double, 8> belief;
+    belief.x.setZero();
+    belief.P.setZero();
+    const int kind = i < 2 ? 0 : (i - 2) / 2;
+    for (const bool variance : {false, true}) {
+      belief.x(i) = variance ? 0 : -5;
+      belief.P(i, i) = variance ? 25 : 0;
+      const auto extent = Filter::extent_of(belief);
+      for (int k = 0; k < 3; ++k) CHECK(extent.square[k] == (k == kind ? 25 : 0));
+    }
+  }
+}
+
 TEST_CASE("outage: a shared state that is refused leaves the one before") {
   using Filter = OpenEkf<Compass<double>, Master<double>, 2>;
   auvest::Outage<Filter, 2> outage(Filter((Compass<double>()), Master<double>()));
