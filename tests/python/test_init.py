@@ -137,6 +137,14 @@ def test_units_by_name_and_by_size(tmp_path: Path) -> None:
     assert made.units == {"time_s": "ms", "range_m": "cm", "azimuth_rad": "deg"}
 
 
+def test_both_speeds_of_an_instrument_are_in_its_unit(tmp_path: Path) -> None:
+    """Forward some 1,000 mm/s; to starboard so few that they might be metres."""
+    lines = "".join(f"{t},{1000 + t},{t % 3}\n" for t in range(20))
+    (tmp_path / "dvl.csv").write_text(f"time_s,Vx,Vy\n{lines}")
+    (made,) = guess(tmp_path).files.values()
+    assert (made.units["speed_m_s"], made.units["starboard_m_s"]) == ("mm/s", "mm/s")
+
+
 @pytest.mark.parametrize(
     ("depth", "step_s", "range_m", "unit"),
     [

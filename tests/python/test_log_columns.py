@@ -26,6 +26,7 @@ from auvest.logs.reading import seconds_of
 from auvest.logs.write import write_file
 from auvest.replay import Settings, checks, replay, settings_from
 from auvest.replay.engine import replay_of
+from auvest.replay.instruments import Instruments
 
 SURE: dict[str, Any] = {
     "start": {"sigma_position_m": 1e-6, "sigma_heading_rad": 1e-6},
@@ -475,6 +476,16 @@ def test_a_craft_must_turn_by_something(tmp_path: Path) -> None:
     write_file(log, "odometry.csv", time_s=[0.0], speed_m_s=[1.0])
     with pytest.raises(LogError, match="how does the craft turn"):
         LogFolder(log)
+
+
+def test_a_source_may_have_none_of_what_all_others_have() -> None:
+    """A latency of 0 is one; what a source does not say is as for all."""
+    settings = settings_from(
+        {"ranges": {"latency_s": 0.5, "sources": {"2": {"latency_s": 0.0}, "3": {"sigma_m": 9.0}}}}
+    )
+    rows = np.array([[0.0, source] for source in (1, 2, 3, 2)])
+    found = Instruments._per_source(None, rows, settings.ranges, "latency_s")  # type: ignore[arg-type]
+    assert found.tolist() == [0.5, 0.0, 0.5, 0.0]
 
 
 @pytest.mark.parametrize(

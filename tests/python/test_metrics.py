@@ -23,6 +23,8 @@ def test_nees_of_known_vectors():
     assert value[[0, 2]] == pytest.approx([2.0, 6.0], rel=1e-14)
     assert np.isnan(value[1])
     assert metrics.nees([1.0, 2.0], p[0]) == pytest.approx(2.0)
+    # What is no covariance, but can be solved, shows that it is none.
+    assert metrics.nees([1.0, 2.0], np.diag([1.0, -4.0])) == pytest.approx(0.0)
     with pytest.raises(ValueError, match=r"error has shape \(3, 2\) and P \(2, 2\)"):
         metrics.nees(error, p[0])
 

@@ -200,6 +200,12 @@ def test_dvl_of_json_v3_has_the_time_of_validity(tmp_path: Path) -> None:
     assert log["odometry.csv"] == [[_EPOCH + t, 0.5, 0] for t in TIMES[:3] + TIMES[4:]]
 
 
+def test_the_listing_counts_what_is_missing(tmp_path: Path) -> None:
+    path = written(tmp_path, "a.csv", "t,x\n1,\n2,5\n3,\n4,\n")
+    found = listing(open_recording(path))["topics"]["row"]["fields"]["x"]
+    assert (found["missing"], found["min"], found["max"]) == (3, 5, 5)
+
+
 def test_dvl_without_times_counts_its_periods(tmp_path: Path) -> None:
     """Milliseconds since the report before; what is the same line again is no new report."""
     a = '{"time": 250.5, "vx": 0.5, "vy": 0, "vz": 0, "velocity_valid": true, "format": "json_v1"}'

@@ -73,14 +73,14 @@ def test_every_flipped_byte_is_refused():
         for bits in (0x01, 0x80, 0xFF):
             damaged = bytearray(state)
             damaged[place] ^= bits
-            with pytest.raises(ValueError, match=r"state is (damaged|not from save)"):
+            with pytest.raises(ValueError, match=r"state is (damaged|not from save|cut short)"):
                 _state.unpack(bytes(damaged), "Ekf", DESCRIPTION)
 
 
 def test_every_truncation_and_extension_is_refused():
     state = packed()
     for length in range(len(state)):
-        with pytest.raises(ValueError, match=r"state is (damaged|not from save)"):
+        with pytest.raises(ValueError, match=r"state is (damaged|not from save|cut short)"):
             _state.unpack(state[:length], "Ekf", DESCRIPTION)
     for more in (b"\0", b"\0\0\0\0", state, struct.pack("<I", zlib.crc32(state))):
         with pytest.raises(ValueError, match=f"{len(state + more)} bytes, expected {len(state)}"):
@@ -121,6 +121,10 @@ def test_another_class_is_refused_and_named():
         ({"process": {"class": "Still", "psd": 0.1}}, r"process\.axes is missing, expected \[1, 2"),
         ({"sensor": {"class": "Eye"}}, "sensor is Eye, expected None"),
         ({"more": 1}, "more is 1, expected nothing of that name"),
+        (
+            {"process": {**DESCRIPTION["process"], "more": 1}},
+            r"process\.more is 1, expected nothing of that name",
+        ),
     ],
 )
 def test_another_description_is_refused_and_what_differs_is_named(change, message):
