@@ -52,7 +52,8 @@ def test_arguments_and_their_defaults(kept: Kept) -> None:
     places = (auvest, cooperative, mission, slat, tracking, vehicle, guidance, metrics, config)
     lines = []
     for place in places:
-        for name, one in sorted(vars(place).items()):
+        for name in sorted(getattr(place, "__all__", None) or vars(place)):
+            one = getattr(place, name)
             if callable(one) and not name.startswith("_") and "auvest" in str(one.__module__):
                 with contextlib.suppress(ValueError):  # of compiled ones
                     lines.append(f"{place.__name__}.{name}{inspect.signature(one)}")
