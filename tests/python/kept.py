@@ -46,7 +46,7 @@ def written(folder: Path) -> str:
             if path.suffix == ".csv" and len(lines) > _HEAD + _END:
                 lines[_HEAD:-_END] = [f"... {len(lines)} lines"]
             parts += [f"\n--- {path.relative_to(folder)}", *lines]
-    return re.sub(r'"version": "[^"]*"', '"version": "VERSION"', "\n".join(parts)) + "\n"
+    return re.sub(r'"version": "unknown"', '"version": "VERSION"', "\n".join(parts)) + "\n"
 
 
 def _last_digit(number: str) -> float:

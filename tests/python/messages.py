@@ -17,6 +17,7 @@ import pytest
 from typer.testing import CliRunner
 
 import auvest
+from auvest.commands.version import version
 
 FILE = Path(__file__).with_name("messages.txt")
 
@@ -25,11 +26,19 @@ _PACKAGE = str(Path(auvest.__file__).parent)
 
 #: What differs from run to run beside folders, and what stands for it.
 _VARIES = (
-    (re.compile(r"\b0x[0-9a-f]{6,}\b|(?<![\w.])(?=\d*[a-f])([0-9a-f]{8}|[0-9a-f]{32})\b"), "HEX"),
+    (
+        re.compile(
+            r"\b0x[0-9a-f]{6,}\b|(?<![\w.])(?=\d*[a-f])([0-9a-f]{8}|[0-9a-f]{32}|[0-9a-f]{64})\b"
+        ),
+        "HEX",
+    ),
     (re.compile(r"(checksum HEX, but HEX computed): .*"), r"\1: LINE"),
     (re.compile(r"\bhas \d+ bytes"), "has N bytes"),
     (re.compile(r"-?\d(\.\d+)?e-1\d\b"), "ROUNDING"),
     (re.compile(r"/tmp/[\w.-]+"), "/tmp/NAME"),
+    (re.compile(r"\bruns \d+ to \d+ of [^:]*:"), "runs N to M of A TASK:"),
+    (re.compile(r"\btcp://[\w.]+:\d+"), "tcp://ADDRESS"),
+    (re.compile(rf"(?<![\w.]){re.escape(version())}(?![\w.])"), "VERSION"),
 )
 
 
