@@ -12,9 +12,6 @@ from messages import Messages, neutral, read, watch, write
 
 ROOT = Path(__file__).resolve().parents[2]
 
-#: The messages that have been read.
-KNOWN = pytest.StashKey()
-
 
 def pytest_addoption(parser):
     """Add what renews the texts that are kept."""
@@ -27,16 +24,21 @@ def places(tmp_path_factory):
     return {str(tmp_path_factory.getbasetemp()): "TMP", str(ROOT): "ROOT"}
 
 
+@pytest.fixture(scope="session")
+def known():
+    """Return the messages of messages.txt."""
+    return read()
+
+
 @pytest.fixture(autouse=True)
-def known_messages(request, monkeypatch, places):
+def known_messages(request, monkeypatch, places, known):
     """Have every message that the test provokes be one of messages.txt."""
     messages = Messages(places)
     watch(monkeypatch, messages)
     yield
-    known = request.config.stash.setdefault(KNOWN, read())
     new = [message for message in messages.said if message not in known]
     if new and request.config.getoption("--renew"):
-        known |= {*new, *read()}  # of another process, too
+        known.update(new, read())  # of another process, too
         write(known)
     elif new:
         pytest.fail("not in messages.txt (--renew adds it):\n" + "\n\n".join(new), pytrace=False)

@@ -38,6 +38,7 @@ _VARIES = (
     (re.compile(r"/tmp/[\w.-]+"), "/tmp/NAME"),
     (re.compile(r"\bruns \d+ to \d+ of [^:]*:"), "runs N to M of A TASK:"),
     (re.compile(r"\btcp://[\w.]+:\d+"), "tcp://ADDRESS"),
+    (re.compile(r'(?<="version": )"unknown"'), '"VERSION"'),  # of sources that are not installed
     (re.compile(rf"(?<![\w.]){re.escape(version())}(?![\w.])"), "VERSION"),
 )
 

@@ -10,10 +10,10 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import pytest
-from kept import written
+from kept import Kept, written
 from test_check import arc
 from test_init import recorders
 from test_log_columns import spatial_log
@@ -30,12 +30,6 @@ from auvest.replay.toml import settings_text
 from auvest.reproduce.mistakes import measure
 from auvest.reproduce.mistakes.injected import MISTAKES
 from auvest.simulation import cooperative, mission, slat, tracking
-
-
-class Kept(Protocol):
-    """The fixture of conftest.py."""
-
-    def __call__(self, name: str, text: str, *, exact: bool = False) -> None: ...
 
 
 def told(folder: Path, line: str) -> str:
@@ -74,16 +68,23 @@ def test_options_and_their_defaults(kept: Kept) -> None:
     kept("options.txt", "\n".join(options(get_command(app), "auvest")) + "\n", exact=True)
 
 
-SIMULATE = {
-    "aukf": "aukf --runs 3",
-    "aukf_lognormal": "aukf --runs 2 --noise lognormal --dtype float64",
-    "slatf": "slatf --runs 2 --duration 40 --particles 30 --log",
-    "slatf_unknown": "slatf --runs 2 --duration 40 --particles 30 --filter slatf-joint --masters 3 "
-    "--association unknown --outlier 0.1 --gate 16 --plan unknown",
-    "mekf": "mekf --runs 2 --steps 200",
-    "mekf_late": "mekf --runs 2 --steps 200 --filter ukf --kernel hampel --late 0.3 --dropout 0.2 "
-    "--displaced 20",
-    "mission": "mission --runs 2 --track circle --outliers 0.05 --kernel igg",
+COMMANDS = {
+    "simulate_aukf": "simulate aukf --runs 3 --no-figure",
+    "simulate_aukf_lognormal": "simulate aukf --runs 2 --noise lognormal --dtype float64 "
+    "--no-figure",
+    "simulate_slatf": "simulate slatf --runs 2 --duration 40 --particles 30 --log --no-figure",
+    "simulate_slatf_unknown": "simulate slatf --runs 2 --duration 40 --particles 30 "
+    "--filter slatf-joint --masters 3 --association unknown --outlier 0.1 --gate 16 "
+    "--plan unknown --no-figure",
+    "simulate_mekf": "simulate mekf --runs 2 --steps 200 --no-figure",
+    "simulate_mekf_late": "simulate mekf --runs 2 --steps 200 --filter ukf --kernel hampel "
+    "--late 0.3 --dropout 0.2 --displaced 20 --no-figure",
+    "simulate_mission": "simulate mission --runs 2 --track circle --outliers 0.05 --kernel igg "
+    "--no-figure",
+    "reproduce_vehicle": "reproduce vehicle --runs 2",
+    "reproduce_slat_cases": "reproduce slat-cases --runs 2 --particles 30",
+    "reproduce_slat_robust": "reproduce slat-robust --runs 8",
+    "reproduce_constants": "reproduce constants --runs 1",
 }
 
 
@@ -93,24 +94,9 @@ def no_recordings(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("AUVEST_DATA", raising=False)
 
 
-@pytest.mark.parametrize("name", SIMULATE)
-def test_simulations(name: str, tmp_path: Path, kept: Kept) -> None:
-    line = f"simulate {SIMULATE[name]} --no-figure --output OUT"
-    kept(f"simulate_{name}.txt", told(tmp_path, line))
-
-
-REPRODUCE = {
-    "vehicle": "--runs 2",
-    "slat_cases": "--runs 2 --particles 30",
-    "slat_robust": "--runs 8",
-    "constants": "--runs 1",
-}
-
-
-@pytest.mark.parametrize("name", REPRODUCE)
-def test_pages(name: str, tmp_path: Path, kept: Kept) -> None:
-    line = f"reproduce {name.replace('_', '-')} {REPRODUCE[name]} --output OUT"
-    kept(f"reproduce_{name}.txt", told(tmp_path, line))
+@pytest.mark.parametrize("name", COMMANDS)
+def test_simulations_and_pages(name: str, tmp_path: Path, kept: Kept) -> None:
+    kept(f"{name}.txt", told(tmp_path, f"{COMMANDS[name]} --output OUT"))
 
 
 LOGS = {

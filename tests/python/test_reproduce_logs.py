@@ -6,13 +6,13 @@ import functools
 import io
 import json
 import os
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from kept import Kept
 from rich.console import Console
 from typer.testing import CliRunner
 
@@ -207,9 +207,7 @@ def perfect(tmp_path_factory: pytest.TempPathFactory) -> logs.Reproduction:
     return logs.measure(data=made_up_recordings(tmp_path_factory.mktemp("recordings")))
 
 
-def test_recordings_without_noise_are_followed(
-    perfect: logs.Reproduction, kept: Callable[[str, str], None]
-) -> None:
+def test_recordings_without_noise_are_followed(perfect: logs.Reproduction, kept: Kept) -> None:
     """Odometry and ranges agree with the truth, whatever the filter, its kernel and its noise."""
     filters = [("ekf", ""), *(("robust-ekf", k) for k in logs.KERNELS), ("robust-ukf", "hampel")]
     expected = [(name, *one) for name in logs.TARGETS for one in filters]

@@ -7,7 +7,7 @@ import json
 import re
 import shutil
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import CancelledError
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from kept import written
+from kept import Kept, written
 from typer.testing import CliRunner
 
 import auvest
@@ -406,7 +406,7 @@ def test_the_commands_of_the_page_run(
     assert json.loads(done.stdout)["missing_tasks"] == 12
 
 
-def test_the_command_writes_what_it_shows(tmp_path: Path, kept: Callable[[str, str], None]) -> None:
+def test_the_command_writes_what_it_shows(tmp_path: Path, kept: Kept) -> None:
     config = tmp_path / "s.toml"
     config.write_text(
         '[sweep]\nscenario = "tracking"\nruns = 5\n[fixed]\nsteps = 5\n[grid]\n'

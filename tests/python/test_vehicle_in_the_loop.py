@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from kept import written
+from kept import Kept, written
 from typer.testing import CliRunner
 
 from auvest import mission_line, telemetry
@@ -321,7 +321,7 @@ def test_options_that_do_not_go_together(arguments: list[str], message: str) -> 
 
 
 def test_runs_that_are_flown_are_not_flown_again(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, kept: Callable[[str, str], None]
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, kept: Kept
 ) -> None:
     """A board fails in run 1 of 3: the same command flies 1 and 2, and reports as of one go."""
     flown: list[int] = []
