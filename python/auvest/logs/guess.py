@@ -16,7 +16,7 @@ from pathlib import Path
 from statistics import median
 
 from auvest._outputs import is_plain_file
-from auvest.logs.layout import COLUMNS, FILES, TURN, match
+from auvest.logs.layout import COLUMNS, FILES, TIME_UNITS, TURN, match
 from auvest.logs.reading import SEPARATORS, UNITS, FileReading, columns_of, parted, seconds_of
 
 #: No craft dives faster than this, m/s.
@@ -241,8 +241,7 @@ def _by_size(column: str, numbers: list[float]) -> str:
     largest = max(map(abs, numbers), default=0.0)
     unit = COLUMNS[column].unit
     if unit == "s":
-        limits = {"ns": 1e17, "us": 1e14, "ms": 1e11}
-        return next((name for name, low in limits.items() if largest > low), "")
+        return next((name for name, low in TIME_UNITS.items() if largest > low), "")
     if unit == "rad" and largest > TURN:
         return "deg"
     if unit == "deg" and largest > 360:

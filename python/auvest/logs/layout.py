@@ -17,6 +17,9 @@ import numpy.typing as npt
 #: A full turn, however it was rounded.
 TURN = 2 * math.pi + 1e-4
 
+#: What a time beyond so many seconds is in, as no clock of seconds tells it.
+TIME_UNITS: Mapping[str, float] = {"ns": 1e17, "us": 1e14, "ms": 1e11}
+
 Unit: TypeAlias = Literal["s", "m", "m/s", "rad", "rad/s", "deg", ""]
 
 
@@ -72,9 +75,9 @@ class Column:
         if self.name == "time_s":
             if value < 0:
                 return "", "unreadable"
-            if value < 1e14:
+            if value < TIME_UNITS["us"]:
                 return "milliseconds?", "milliseconds"
-            return "microseconds?" if value < 1e17 else "nanoseconds?", "microseconds"
+            return "microseconds?" if value < TIME_UNITS["ns"] else "nanoseconds?", "microseconds"
         if self.name == "temperature_c" and value < self.low:
             return "a code for 'no value'?", self.cause
         return self.suspicion, self.cause
@@ -122,8 +125,8 @@ def _angle(name: str) -> Column:
 COLUMNS: Mapping[str, Column] = {
     column.name: column
     for column in (
-        Column("time_s", -1e11, 1e11),
-        Column("time", -1e11, 1e11),
+        Column("time_s", -TIME_UNITS["ms"], TIME_UNITS["ms"]),
+        Column("time", -TIME_UNITS["ms"], TIME_UNITS["ms"]),
         Column("source", 0, 1e9, integer=True),
         _length("forward_m"),
         _length("distance_m"),

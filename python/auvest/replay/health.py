@@ -423,18 +423,17 @@ def health(residuals: Residuals, found: Iterable[Finding]) -> Health:
     found = list(found)
     verdict = worst(one.verdict for one in found)
     rows = residuals.rows()
-    count = len(rows["nis"])
+    count, inside = len(rows["nis"]), within(rows)
     reasons = [one.text for one in found if one.verdict == verdict]
     if verdict == "sound":
         few = f"only {counted(count, 'measurement')}: hardly anything to judge by"
-        reasons = [few if count < FEW else _size(_share(rows, within(rows)))]
+        reasons = [few if count < FEW else _size(_share(rows, inside))]
         if count == 0 and residuals.judged:
             reasons = [f"the gate refused {residuals.refused} of {residuals.judged} echoes"]
     if count == 0:
         return Health(
             verdict, reasons[0], 0, None, None, None, None, None, residuals.recoveries, [], [], []
         )
-    inside = within(rows)
     mean, spread = _expected(rows)
     reach = 1.96 * spread / math.sqrt(max(int(inside.sum()), 1))
     sources = np.unique(rows["source"][rows["source"] >= 0]).tolist()

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from auvest._arguments import Floats
 from auvest.logs import LogError, LogFolder
 from auvest.logs.changed import Change, columns_changed
-from auvest.logs.reader import CsvTable, Rows
+from auvest.logs.reader import Rows
 from auvest.replay.config import Settings
 
 #: Where the formula holds, and the unit.
@@ -36,10 +36,11 @@ def sound_speed_m_s(
     """
     given = [np.asarray(one, np.float64) for one in (temperature_c, salinity_psu, depth_m)]
     for name, values in zip(VALID, given, strict=True):
-        for value in values[_outside(name, values)].flat:
+        if (k := _first_outside(name, values)) is not None:
             low, high, _ = VALID[name]
             raise ValueError(
-                f"{name} must lie in {low:g}..{high:g}, where the formula holds, not {value:.10g}"
+                f"{name} must lie in {low:g}..{high:g}, where the formula holds, "
+                f"not {values.flat[k]:.10g}"
             )
     t, s, z = given
     speed: Floats = (
@@ -63,12 +64,12 @@ def range_changes(log: LogFolder, settings: Settings) -> dict[str, Change]:
     if len(rows) == 0:
         raise LogError(table.path, "has no line below the header")
     salinity = table.column(rows, "salinity_psu", settings.water.salinity_psu)
-    _require_valid(table, "temperature_c", rows[:, 1])
-    if "salinity_psu" in table.names:
-        _require_valid(table, "salinity_psu", salinity)
-    elif _outside("salinity_psu", salinity).any():
-        refusal = _refusal("salinity_psu", settings.water.salinity_psu)
-        raise LogError(table.path, f"[water] salinity_psu: {refusal}")
+    for name, values in (("temperature_c", rows[:, 1]), ("salinity_psu", salinity)):
+        if (k := _first_outside(name, values)) is not None:
+            refusal = _refusal(name, values[k])
+            if name in table.names:
+                raise LogError(table.path, refusal, line=k + 2, column=name)
+            raise LogError(table.path, f"[water] {name}: {refusal}")
     order = np.argsort(rows[:, 0], kind="stable")
     rows, salinity = rows[order], salinity[order]
     depth = np.zeros(len(rows))
@@ -77,9 +78,9 @@ def range_changes(log: LogFolder, settings: Settings) -> dict[str, Change]:
         if len(track):
             depth = np.interp(rows[:, 0], *track[np.argsort(track[:, 0], kind="stable")].T)
             depth = np.maximum(depth, 0.0)  # they are noisy at the surface
-            for value in depth[_outside("depth_m", depth)]:
+            if (k := _first_outside("depth_m", depth)) is not None:
                 path = log["depth.csv"].path
-                raise LogError(path, _refusal("depth_m", value), column="depth_m")
+                raise LogError(path, _refusal("depth_m", depth[k]), column="depth_m")
     factor = sound_speed_m_s(rows[:, 1], salinity, depth) / settings.water.assumed_m_s
 
     def corrected(ranges: Rows) -> Floats:
@@ -89,9 +90,11 @@ def range_changes(log: LogFolder, settings: Settings) -> dict[str, Change]:
     return dict.fromkeys(("ranges.csv", "fixes.csv"), columns_changed({2: corrected}))
 
 
-def _outside(name: str, values: Floats) -> npt.NDArray[np.bool_]:
+def _first_outside(name: str, values: Floats) -> int | None:
+    """Give the place of the first value for which the formula does not hold."""
     low, high, _ = VALID[name]
-    return ~((values >= low) & (values <= high))
+    outside = np.flatnonzero(~((values >= low) & (values <= high)))
+    return int(outside[0]) if len(outside) else None
 
 
 def _refusal(name: str, value: float) -> str:
@@ -100,12 +103,6 @@ def _refusal(name: str, value: float) -> str:
         f"{value:.10g} is outside {low:g}..{high:g}{unit}, where the formula for the speed of "
         "sound holds"
     )
-
-
-def _require_valid(table: CsvTable, name: str, values: Floats) -> None:
-    """Refuse a column of the whole file where the formula does not hold."""
-    for k in np.flatnonzero(_outside(name, values)):
-        raise LogError(table.path, _refusal(name, values[k]), line=int(k) + 2, column=name)
 
 
 def _rows(log: LogFolder, name: str) -> Rows:
